@@ -9,7 +9,7 @@ NLopt's seconds are those of one solver with all its starts in a process that is
 fluxform's are those of the whole process, one thread, certificate left out (`fluxform`) or
 included (`fluxform_proven`, air coils only). Both are CPU time. An error is what a solver's best feasible coil
 lacks of the reference's force, which is the best of NLopt's own; with a core NLopt reads a table
-made beforehand, while fluxform solves for the steel and finds valley and alternatives besides.
+made beforehand, while fluxform solves for the steel and also finds the near-optimal bores and the alternatives.
 A solver fails where that is more than the objective's tolerance.
 
     python3 scripts/bench_optimize.py --random 48 [--before OLD_BINARY]

@@ -1,5 +1,5 @@
 //! Digest of the sources that a build is made of: what an earlier build kept is not this one's.
-//! And the revision that `--version` tells of a release build; others would be compiled anew with
+//! And the revision that `--version` prints for a release build; others would be compiled again with
 //! every commit.
 
 use std::collections::hash_map::DefaultHasher;
@@ -67,7 +67,7 @@ fn main() {
     }
     println!("cargo::rustc-env=FLUXFORM_BUILD={:016x}", digest.finish());
     let release = std::env::var("PROFILE").is_ok_and(|profile| profile == "release");
-    let told = release.then(revision).flatten();
-    let told = told.map_or_else(String::new, |revision| format!(" ({revision})"));
-    println!("cargo::rustc-env=FLUXFORM_REVISION={told}");
+    let reported = release.then(revision).flatten();
+    let reported = reported.map_or_else(String::new, |revision| format!(" ({revision})"));
+    println!("cargo::rustc-env=FLUXFORM_REVISION={reported}");
 }

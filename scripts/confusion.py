@@ -100,18 +100,18 @@ def main():
         f"{kind}: largest | rms | confused" for _, kind in kinds) + " |")
     print("|---|" + "---|" * 6)
     counted = {kind: confusions(feedback) for feedback, kind in kinds}
-    told = {(kind, what): [] for _, kind in kinds for what in ("", "rms_")}
+    reported = {(kind, what): [] for _, kind in kinds for what in ("", "rms_")}
     for pair in pairs:
         cells = []
         for _, kind in kinds:
             for what in ("", "rms_"):
                 value = pair[f"{kind}_{what}jnd"]
-                told[kind, what].append(value)
+                reported[kind, what].append(value)
                 cells.append(f"{value:.2f}")
             cells.append(str(counted[kind][frozenset((pair["a"], pair["b"]))]))
         print(f"| {pair['a']}, {pair['b']} | " + " | ".join(cells) + " |")
     print()
-    for (kind, what), values in told.items():
+    for (kind, what), values in reported.items():
         confused = [counted[kind][frozenset((pair["a"], pair["b"]))] for pair in pairs]
         # The largest with feedback is the same for three pairs but for rounding.
         rho, strong, orders = spearman([round(value, 6) for value in values], confused)

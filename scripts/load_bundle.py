@@ -98,10 +98,10 @@ class Bundle:
         chosen = self.map.get("lambda_n_per_m")
         if self.lambda_n_per_m != (None if chosen is None else float(chosen)):
             raise BundleError("map.npz and manifest.json must agree on lambda_n_per_m")
-        told = self.manifest["map"]
-        passive = told.get("passive_force")
-        for told in [told] if passive is None else [told, passive]:
-            name = told["interpolation"]["name"]
+        reported = self.manifest["map"]
+        passive = reported.get("passive_force")
+        for reported in [reported] if passive is None else [reported, passive]:
+            name = reported["interpolation"]["name"]
             if name != INTERPOLATION:
                 raise BundleError(f"interpolation {name!r}, this loader implements {INTERPOLATION!r}")
         if (passive is not None) != ("passive_force_n" in self.map):
@@ -460,7 +460,7 @@ def _between(nodes, positions):
     return cell, (positions - nodes[cell]) / (nodes[cell + 1] - nodes[cell]), inside
 
 
-# Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is told in
+# Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is reported in
 # src/lambda/allocation.rs; here it is written for clearness, not for speed.
 ROUNDING = 1e-14
 TIED = 1e-13

@@ -36,8 +36,8 @@ def main(pages):
             seen.append(browser.value(PAINT))
         seen = [ms for ms in seen[1:] if ms is not None]
         missing |= not seen
-        told = f"{statistics.median(seen):.0f}" if seen else "none"
-        print(f"| {page} | {pathlib.Path(page).stat().st_size / 1e3:.0f} | {told} |")
+        reported = f"{statistics.median(seen):.0f}" if seen else "none"
+        print(f"| {page} | {pathlib.Path(page).stat().st_size / 1e3:.0f} | {reported} |")
     faults = browser.faults()
     browser.close()
     if faults or missing:

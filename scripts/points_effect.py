@@ -30,7 +30,7 @@ def program():
 
 
 def solved(binary, shape):
-    """The JSON of `lambda` for graded points; it tells the grid's constant besides."""
+    """The JSON of `lambda` for graded points; it also states the grid's constant."""
     command = [binary, "lambda", DESIGN, f"shapes/{shape}.toml", *FINE, "--format", "json"]
     ran = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     if ran.returncode != 0:
@@ -44,16 +44,16 @@ def main():
           "stated: heights | grid against resolved |")
     print("|---|---|---|---|---|---|---|---|")
     for shape in SHAPES:
-        told = solved(binary, shape)
-        sampling, accuracy = told["sampling"], told["accuracy"]
+        reported = solved(binary, shape)
+        sampling, accuracy = reported["sampling"], reported["accuracy"]
 
         def percent(stage, accuracy=accuracy):
             return f"{100 * accuracy[stage]['estimate']:.3f} %" if stage in accuracy else "-"
 
         change = 1 / (1 + sampling["relative_change"]) - 1
         print(f"| {shape.replace('_', '-')} | {sampling['grid_points']} | "
-              f"{sampling['grid_lambda_n_per_m']:.4f} | {told['points']} | "
-              f"{told['lambda_n_per_m']:.4f} | {percent('quadrature')} | "
+              f"{sampling['grid_lambda_n_per_m']:.4f} | {reported['points']} | "
+              f"{reported['lambda_n_per_m']:.4f} | {percent('quadrature')} | "
               f"{percent('lambda_of_heights')} | {100 * change:+.2f} % |")
 
 

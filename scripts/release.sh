@@ -6,7 +6,7 @@
 #
 # For x86_64 with musl where `rustup target add x86_64-unknown-linux-musl` was done, else with glibc
 # linked in. Needs Rust, GNU tar and gzip; the empty root needs `unshare` and the permission to make a
-# user namespace, else it is left out, told.
+# user namespace, else it is left out with a message.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

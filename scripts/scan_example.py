@@ -25,8 +25,8 @@ def main():
     true = [tuple(p + s for p, s in zip(point, SHIFT_M)) for point in read]
     table = "x_m,y_m,z_m\n" + "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in true)
     command = [sys.argv[1], "probe", "designs/seed_air.toml", "-", "--quiet"]
-    told = subprocess.run(command, input=table, text=True, capture_output=True, check=True).stdout
-    rows = list(csv.DictReader(io.StringIO(told)))
+    reported = subprocess.run(command, input=table, text=True, capture_output=True, check=True).stdout
+    rows = list(csv.DictReader(io.StringIO(reported)))
     print("x_m,y_m,z_m,coil,current_a,bx_t,by_t,bz_t")
     for coil, gain in GAINS.items():
         for point, row in zip(read, (row for row in rows if row["coil"] == str(coil))):

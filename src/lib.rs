@@ -133,6 +133,8 @@
 //! computes, its arguments and its text.
 
 pub use fluxform_base::accuracy;
+pub use fluxform_base::choice;
+pub use fluxform_base::choices;
 pub use fluxform_base::digits;
 pub use fluxform_base::force_direction;
 pub use fluxform_base::point_weights;

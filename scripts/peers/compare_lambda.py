@@ -59,15 +59,15 @@ def peer_python():
 class Problem:
     """One problem in one of its two statements; x are the solvers' variables."""
 
-    def __init__(self, told, scaled):
+    def __init__(self, reported, scaled):
         import numpy as np
 
-        self.told = told
-        self.coils = told["coils"]
-        self.g = np.array(told["forces_n_per_a"]).reshape(-1, self.coils)
-        self.h = np.array(told["height_m"])
-        self.u = np.array(told["upper_a"])
-        self.total = told["total_max_a"]
+        self.reported = reported
+        self.coils = reported["coils"]
+        self.g = np.array(reported["forces_n_per_a"]).reshape(-1, self.coils)
+        self.h = np.array(reported["height_m"])
+        self.u = np.array(reported["upper_a"])
+        self.total = reported["total_max_a"]
         self.unit = self.u.copy() if scaled else np.ones(self.coils)
         self.a = self.g * self.unit
         self.upper = self.u / self.unit
@@ -93,11 +93,11 @@ class Problem:
 
         long = np.longdouble
         i = self.currents(x).astype(long)
-        rest = long(self.told["lambda_n_per_m"][k]) * self.h.astype(long) - self.g.astype(long) @ i
+        rest = long(self.reported["lambda_n_per_m"][k]) * self.h.astype(long) - self.g.astype(long) @ i
         if form == "mean":
-            least = self.told["least_mean_square_n2"][k]
+            least = self.reported["least_mean_square_n2"][k]
             return float((rest @ rest / len(rest) - least) / least)
-        least = self.told["least_worst_n"][k]
+        least = self.reported["least_worst_n"][k]
         return float((np.abs(rest).max() - least) / least)
 
     def sum_row(self):
@@ -296,37 +296,37 @@ def answer(p, form, solver, k, x0):
     import numpy as np
 
     try:
-        x, success = solver(p, p.told["lambda_n_per_m"][k], x0)
+        x, success = solver(p, p.reported["lambda_n_per_m"][k], x0)
         ended = p.currents(x) / np.where(p.unit > 0, p.unit, 1)
         return p.error(form, k, x), success, ended
     except Exception:  # noqa: BLE001 - whatever a peer raises is its failure
         return p.error(form, k, np.zeros(p.coils)), False, np.zeros(p.coils)
 
 
-def child(pipe, told, scaled, form, name):
+def child(pipe, reported, scaled, form, name):
     """Answers for one lambda, then for the curve, as far as there is time."""
     import numpy as np
 
-    p, solver = Problem(told, scaled), SOLVERS[form][name]
-    answer(p, form, solver, told["one"], np.zeros(p.coils))
+    p, solver = Problem(reported, scaled), SOLVERS[form][name]
+    answer(p, form, solver, reported["one"], np.zeros(p.coils))
     pipe.send(None)
     seconds = []
     for _ in range(REPEATS):
         begun = time.perf_counter()
-        error, success, _ = answer(p, form, solver, told["one"], np.zeros(p.coils))
+        error, success, _ = answer(p, form, solver, reported["one"], np.zeros(p.coils))
         seconds.append(time.perf_counter() - begun)
     pipe.send([[(error, success)], sorted(seconds)[REPEATS // 2]])
     begun, found, x0 = time.perf_counter(), [], np.zeros(p.coils)
-    for k in range(len(told["lambda_n_per_m"])):
+    for k in range(len(reported["lambda_n_per_m"])):
         error, success, x0 = answer(p, form, solver, k, x0)
         found.append((error, success))
     pipe.send([found, time.perf_counter() - begun])
 
 
-def tried(told, scaled, form, name, patience):
+def tried(reported, scaled, form, name, patience):
     """[one lambda, the curve]: their answers and seconds, None where there was no answer."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
-    process = multiprocessing.Process(target=child, args=(theirs, told, scaled, form, name))
+    process = multiprocessing.Process(target=child, args=(theirs, reported, scaled, form, name))
     process.start()
     theirs.close()
     results = []

@@ -72,9 +72,9 @@ def main():
             "--format", "json", "map", arguments.design, "--out", folder,
             "--vfield", files["vfield"], "--mpem", files["mpem"], *for_map,
         )
-        told = json.loads(run.stdout)
-        print(f"{told['design']}: map took {time.perf_counter() - start:.1f} s, code {run.returncode}")
-        axes = [told["map"][key] for key in ("x_m", "y_m", "z_m")]
+        reported = json.loads(run.stdout)
+        print(f"{reported['design']}: map took {time.perf_counter() - start:.1f} s, code {run.returncode}")
+        axes = [reported["map"][key] for key in ("x_m", "y_m", "z_m")]
         low = np.array([axis["from_m"] for axis in axes])
         high = np.array([axis["to_m"] for axis in axes])
 
@@ -118,7 +118,7 @@ def main():
                 sys.exit("computeFieldGradient5FromCurrents is not the actuation matrix times currents")
             off = magnitudes(read - exact).max(axis=(2, 3)) / sizes
             for kind, key, worst in zip(("field", "gradient"), (name, f"{name}_gradient"), off.max(axis=1)):
-                stated = told["accuracy"][key]["estimate"]
+                stated = reported["accuracy"][key]["estimate"]
                 word = "" if worst <= stated else "  MORE THAN STATED"
                 good &= worst <= stated
                 print(f"  {kind:9} largest error {worst:.2e}, stated {stated:.2e}{word}")
@@ -126,7 +126,7 @@ def main():
 
             # Currents for a field and gradient that currents of up to 1 A make.
             different, missed = [], [0.0, 0.0]
-            stated = [told["accuracy"][key]["estimate"] for key in (name, f"{name}_gradient")]
+            stated = [reported["accuracy"][key]["estimate"] for key in (name, f"{name}_gradient")]
             for index in np.ndindex(points_m.shape[:2]):
                 matrix = exact[index].T
                 wanted = matrix @ rng.uniform(-1.0, 1.0, matrix.shape[1])

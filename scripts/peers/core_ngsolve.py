@@ -112,7 +112,7 @@ def swept(asked):
     coil = (winding["inner_radius_m"], winding["outer_radius_m"], -winding["length_m"], 0)
     core = (steel["radius_m"], steel["bottom_m"], steel["top_m"])
     heights_m = [place["z_m"] for place in asked["on_axis"]]
-    told = []
+    reported = []
     for order in SWEPT_ORDERS[: 4 if asked["quick"] else None]:
         def work(order=order):
             return solve(coil, core, winding["turns"], steel["relative_permeability"], heights_m, order)
@@ -122,8 +122,8 @@ def swept(asked):
         for found, place in zip(gradients, asked["on_axis"]):
             off = abs(found - place["dbz_dz_t_per_m_per_a"])
             errors.append(off / place["gradient_norm_t_per_m_per_a"])
-        told.append(rows.row(order, 1, max(errors), spread))
-    return told
+        reported.append(rows.row(order, 1, max(errors), spread))
+    return reported
 
 
 def main():

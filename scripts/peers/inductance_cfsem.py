@@ -44,7 +44,7 @@ def main():
         return
     import cfsem
 
-    told = []
+    reported = []
     for root in SWEPT[: 3 if asked["quick"] else None]:
         def work(root=root):
             found = []
@@ -55,9 +55,9 @@ def main():
 
         found, spread = rows.timed(work)
         errors = [abs(value / case["inductance_h"] - 1) for value, case in zip(found, asked["cases"])]
-        told.append(rows.row(root, len(errors), max(errors), spread))
+        reported.append(rows.row(root, len(errors), max(errors), spread))
     knob = "root of the number of filaments"
-    rows.answer([rows.curve(asked, "cfsem", rows.version("cfsem"), knob, told)])
+    rows.answer([rows.curve(asked, "cfsem", rows.version("cfsem"), knob, reported)])
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def swept(asked, name):
     if form == "mean":
         square = float(np.mean(problem.h**2))
         unit = asked["least_mean_square_n2"][0] / (asked["lambda_n_per_m"][0] ** 2 * square)
-    told = []
+    reported = []
     for tolerance in TOLERANCES:
         compare_lambda.TOLERANCE = tolerance
 
@@ -40,8 +40,8 @@ def swept(asked, name):
             return compare_lambda.answer(problem, form, solver, 0, np.zeros(problem.coils))
 
         (error, success, _), spread = rows.timed(work)
-        told.append(rows.row(tolerance, len(problem.h), max(error, 0.0) * unit if success else None, spread))
-    return told
+        reported.append(rows.row(tolerance, len(problem.h), max(error, 0.0) * unit if success else None, spread))
+    return reported
 
 
 def main():

@@ -107,15 +107,15 @@ def swept(asked):
     x_m, y_m, z_m = (np.array(asked[axis]) for axis in ("x_m", "y_m", "z_m"))
     at = tuple(np.array(asked["coil_z_y_x"]).T)
     exact, size = np.array(asked["gz_t_per_m_per_a"]), np.array(asked["size_t_per_m_per_a"])
-    told = []
+    reported = []
     for shells in SWEPT_SHELLS[: 3 if asked["quick"] else None]:
         coils = [
             magpylib.Collection(*cylinders(*section, shells)).move((x, y, 0))
             for x, y in asked["positions_m"]
         ]
         maps, spread = rows.timed(lambda coils=coils: gradient_map(coils, x_m, y_m, z_m))
-        told.append(rows.row(shells, maps.size, (abs(maps[at] - exact) / size).max(), spread))
-    return told
+        reported.append(rows.row(shells, maps.size, (abs(maps[at] - exact) / size).max(), spread))
+    return reported
 
 
 def main():

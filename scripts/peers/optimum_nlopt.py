@@ -32,7 +32,7 @@ def main():
         design = Path(folder, "design.toml")
         design.write_text(asked["design"], encoding="utf-8")
         for peer, name in SOLVERS.items():
-            told = []
+            reported = []
             for starts in STARTS:
                 if starts > MOST[name]:
                     break
@@ -44,8 +44,8 @@ def main():
                 result, spread = rows.timed(work)
                 best = result["best"]
                 error = abs(best["force_n"] / asked["force_n"] - 1) if best else None
-                told.append(rows.row(starts, 1, error, spread))
-            curves.append(rows.curve(asked, peer, rows.version("nlopt"), "starts", told))
+                reported.append(rows.row(starts, 1, error, spread))
+            curves.append(rows.curve(asked, peer, rows.version("nlopt"), "starts", reported))
     rows.answer(curves)
 
 

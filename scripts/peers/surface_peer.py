@@ -155,9 +155,9 @@ def rows_of(asked):
         *_, sample = peer()
         heights, spread = rows.timed(lambda: sample(mesh, points))
         off = abs(heights[asked["looked_at"]] / MM - np.array(asked["height_m"]))
-        told = [rows.row(len(asked["x_m"]), len(points), np.max(off), spread)]
+        reported = [rows.row(len(asked["x_m"]), len(points), np.max(off), spread)]
         version = rows.version(modules[0])
-        curves.append(rows.curve(asked, name, version, "points along x and y", told))
+        curves.append(rows.curve(asked, name, version, "points along x and y", reported))
     rows.answer(curves, missing)
 
 

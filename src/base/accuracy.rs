@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// The stages of a result that its tolerance governs; what others state is of another kind (a
 /// length, a model's own error).
@@ -50,8 +51,22 @@ impl StageAccuracy {
 }
 
 /// How sure it is that no coil is better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum CertificateKind {
     /// The best near one starting point.
     Local,
@@ -63,6 +78,8 @@ pub enum CertificateKind {
     Global,
 }
 
+crate::choices!(CertificateKind);
+
 impl CertificateKind {
     /// Of local searches alone, by their number.
     #[must_use]
@@ -71,17 +88,6 @@ impl CertificateKind {
             Self::Local
         } else {
             Self::Multistart
-        }
-    }
-
-    /// The word in artefacts, tables and pages.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Local => "local",
-            Self::Multistart => "multistart",
-            Self::Exhaustive => "exhaustive",
-            Self::Global => "global",
         }
     }
 

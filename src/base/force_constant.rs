@@ -36,16 +36,9 @@ pub enum Criterion {
     Maxmin,
 }
 
+crate::choices!(Criterion);
+
 impl Criterion {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// Its name in artefacts, on the command line and on screen.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
     /// Its name, with the just-noticeable difference where that decides.
     #[must_use]
     pub fn described(self, jnd: &str) -> String {
@@ -63,12 +56,6 @@ impl Criterion {
             Self::Linear | Self::Jnd | Self::Saturation => true,
             Self::Maxmin => false,
         }
-    }
-
-    /// Meaning of the constant that it chooses.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
     }
 }
 

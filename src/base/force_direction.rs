@@ -35,21 +35,6 @@ pub enum ForceDirection {
 }
 
 impl ForceDirection {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// Its name in documents, artefacts and on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    /// The direction in words.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
-    }
-
     /// Whether all three components of the force are requested, not the upward one alone.
     #[must_use]
     pub fn is_vector(self) -> bool {
@@ -87,16 +72,7 @@ pub enum NormalForce {
     Upward,
 }
 
-impl NormalForce {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// Its name in documents, artefacts and on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-}
+crate::choices!(ForceDirection, NormalForce);
 
 /// The sideways part of a force whose upward part is given, over that part, at most: 72 degrees.
 pub const STEEPEST: f64 = 3.0;

@@ -1,8 +1,9 @@
 //! Parts used by every room: physical constants and the millimetre border, progress and interruption,
-//! the error statement that every stage attaches to its numbers, the force constants' names,
-//! and which force is requested.
+//! the error statement that every stage attaches to its numbers, choices by name, the force
+//! constants, and which force is requested.
 
 pub mod accuracy;
+pub mod choice;
 pub mod digits;
 pub mod force_constant;
 pub mod force_direction;

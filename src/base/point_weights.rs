@@ -32,16 +32,9 @@ pub enum Weights {
     Area,
 }
 
+crate::choices!(Weights);
+
 impl Weights {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
     /// Whether points count alike, so that a file need not say it.
     #[must_use]
     pub fn is_equal(&self) -> bool {

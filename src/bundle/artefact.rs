@@ -214,11 +214,11 @@ mod tests {
             Options::of(&json!({ "jnd": jnd, "tolerance": null, "arithmetic": arithmetic }))
         };
         assert_eq!(of(0.07, "x86").difference(&of(0.07, "arm")), None);
-        let told = of(0.07, "x86").difference(&of(7.0, "x86"));
-        assert_eq!(told.as_deref(), Some("jnd 0.07, now 7.0"));
+        let reported = of(0.07, "x86").difference(&of(7.0, "x86"));
+        assert_eq!(reported.as_deref(), Some("jnd 0.07, now 7.0"));
         let none = Options::default();
-        let told = none.difference(&of(0.7, "x86"));
-        assert_eq!(told.as_deref(), Some("jnd not given, now 0.7"));
+        let reported = none.difference(&of(0.7, "x86"));
+        assert_eq!(reported.as_deref(), Some("jnd not given, now 0.7"));
         assert!(Options::of(&f64::NAN).is_empty());
     }
 

@@ -57,6 +57,16 @@ impl Origin {
         self
     }
 
+    /// A short name for an entry that is shared by all who ask for this origin: eight hexadecimal digits.
+    #[must_use]
+    pub fn short_name(&self) -> String {
+        let digest = self.0.clone().finalize();
+        digest[..4]
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
+    }
+
     /// The digest of an entry of this origin in `folder`.
     fn digest(&self, folder: &Dir) -> [u8; DIGEST] {
         self.clone().and(&folder.identity()).0.finalize().into()

@@ -346,11 +346,11 @@ mod tests {
     #[test]
     fn a_message_that_quotes_a_long_text_is_cut_in_its_middle() {
         let long = format!("\n\"{}\"", "a.".repeat(60_000));
-        let told = fault(&serde_json::from_str::<u8>(&long).unwrap_err());
-        assert!(told.len() < 900 && told.starts_with("invalid type: string"));
+        let reported = fault(&serde_json::from_str::<u8>(&long).unwrap_err());
+        assert!(reported.len() < 900 && reported.starts_with("invalid type: string"));
         assert!(
-            told.ends_with("expected u8 at line 2 column 120002"),
-            "{told}"
+            reported.ends_with("expected u8 at line 2 column 120002"),
+            "{reported}"
         );
         let short = serde_json::from_str::<u8>("\"a\"").unwrap_err();
         assert_eq!(fault(&short), short.to_string());

@@ -25,7 +25,7 @@ pub(super) const VOLTAGE: &str = "voltage_v";
 pub(super) const DIRECTION: &str = "requested_direction";
 pub(super) const SIDEWAYS_WEIGHT: &str = "sideways_weight";
 
-/// A smaller sideways weight could not be told from rounding.
+/// A smaller sideways weight could not be distinguished from rounding.
 const LEAST_WEIGHT: f64 = 1e-6;
 
 /// Heights, static currents and circuit.

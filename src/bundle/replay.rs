@@ -1,6 +1,7 @@
 //! `replay.csv`: what a runtime commands at every position of a trajectory, and what it gives.
 
 use std::io::{self, Write};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::number::push_number;
 pub use fluxform_lambda::vector_feedback::angle_deg;
@@ -9,7 +10,8 @@ pub use fluxform_lambda::vector_feedback::angle_deg;
 const BLOCK_BYTES: usize = 64 << 10;
 
 /// How a position was answered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumMessage, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Answer {
     /// The force commanded is the requested one.
     Ok,
@@ -19,17 +21,7 @@ pub enum Answer {
     Outside,
 }
 
-impl Answer {
-    /// The word in the column `status`.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Saturated => "saturated",
-            Self::Outside => "outside",
-        }
-    }
-}
+fluxform_base::choices!(Answer);
 
 /// The columns of `replay.csv`, one entry a position; currents coil by coil within a position.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -231,7 +223,7 @@ const COLUMNS: &[ReplayColumn] = &[
     of_vector("direction_error_deg", ReplayRows::direction_error_deg),
     ReplayColumn {
         name: "status",
-        cells: Cells::Word(|rows, at| rows.answer[at].word()),
+        cells: Cells::Word(|rows, at| rows.answer[at].name()),
     },
 ];
 

@@ -443,13 +443,13 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_named() {
-        let told = |text: &str| Scan::read("s", text.as_bytes(), 2).unwrap_err().to_string();
-        assert!(told("x_m,y_m,z_m,bz_mt,coil,current_a\n").contains("bx_t, by_t, bz_t"));
-        assert!(told("x_m,y_m,z_m,bz_t\n").contains("current_0_a"));
-        assert!(told("x_m,y_m,z_m,bz_t,coil\n").contains("column current_a is missing"));
-        assert!(told("x_m,y_m,z_m,bz_t,current_2_a\n").contains("from 0 to 1"));
-        assert!(told("x_m,y_m,z_m,bz_t,coil,current_0_a\n").contains("keep one"));
-        let coil = told("x_m,y_m,z_m,bz_t,coil,current_a\n0,0,0,0,2,1\n");
+        let reported = |text: &str| Scan::read("s", text.as_bytes(), 2).unwrap_err().to_string();
+        assert!(reported("x_m,y_m,z_m,bz_mt,coil,current_a\n").contains("bx_t, by_t, bz_t"));
+        assert!(reported("x_m,y_m,z_m,bz_t\n").contains("current_0_a"));
+        assert!(reported("x_m,y_m,z_m,bz_t,coil\n").contains("column current_a is missing"));
+        assert!(reported("x_m,y_m,z_m,bz_t,current_2_a\n").contains("from 0 to 1"));
+        assert!(reported("x_m,y_m,z_m,bz_t,coil,current_0_a\n").contains("keep one"));
+        let coil = reported("x_m,y_m,z_m,bz_t,coil,current_a\n0,0,0,0,2,1\n");
         assert!(
             coil.contains("s:2: column coil: expected a number from 0 to 1"),
             "{coil}"

@@ -205,7 +205,7 @@ pub fn check_map_files(
     (inputs, made_with): (&[Input], &Options),
     protected: &[PathBuf],
     formats: MapFormats,
-    besides: &[&Path],
+    beside_paths: &[&Path],
 ) -> Result<(), WriteError> {
     let overwrite = overwrite_map(folder, force, (inputs, made_with), protected);
     let csv = formats.csv.then_some("map.csv");
@@ -213,8 +213,8 @@ pub fn check_map_files(
     for name in ["map.npz", "map.json"].into_iter().chain(csv).chain(vti) {
         overwrite.check(&folder.join(name))?;
     }
-    check_distinct(besides)?;
-    for path in besides {
+    check_distinct(beside_paths)?;
+    for path in beside_paths {
         check_beside(path, folder)?;
         overwrite_beside(path, folder, overwrite.clone()).check(path)?;
     }
@@ -293,7 +293,7 @@ pub fn write_map_and(
     sidecar: &MapSidecar,
     map: &MapArrays,
     formats: MapFormats,
-    besides: &[Beside],
+    beside_paths: &[Beside],
     protected: &[PathBuf],
 ) -> Result<MapSidecar, WriteError> {
     let mut sidecar = sidecar.clone();
@@ -315,7 +315,7 @@ pub fn write_map_and(
     if formats.vtk {
         put(&mut set, "map.vti", &|out| write_vti(out, map))?;
     }
-    for beside in besides {
+    for beside in beside_paths {
         check_beside(beside.path, folder)?;
         let overwrite = overwrite_beside(beside.path, folder, overwrite.clone());
         let written = set.write_under(beside.path, overwrite, |out| match beside.content {

@@ -148,7 +148,7 @@ pub struct SurfaceFlags {
     #[arg(long, hide_short_help = true, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
     pub translate: Option<values::Translation>,
     /// The file's direction that points up: x, y, z, -x, -y or -z [default: z]
-    #[arg(long, hide_short_help = true, value_name = "AXIS", value_parser = values::up, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "AXIS", value_parser = values::named::<Up>(), allow_hyphen_values = true)]
     pub up: Option<Up>,
     /// Bring the middle of the surface's box to x = y = 0
     #[arg(long, hide_short_help = true, conflicts_with = "fit")]

@@ -2,20 +2,18 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use strum::{EnumMessage, VariantArray};
 
+use crate::choice::Choice;
 use crate::scene::tolerances::ErrorTarget;
-use crate::shape::document::{Up, parse_unit, unit_names};
+use crate::shape::document::{parse_unit, unit_names};
 use crate::units::m_from_mm;
 
 /// Any variant of `T` by its name; the help states what it means.
 pub fn named<T>() -> impl TypedValueParser<Value = T>
 where
-    T: VariantArray + EnumMessage + Into<&'static str> + FromStr + Copy + Send + Sync,
-    T::Err: std::error::Error + Send + Sync + 'static,
+    T: Choice<Err: std::error::Error + Send + Sync + 'static>,
 {
     let of = |one: &T| {
         let name: &'static str = (*one).into();
@@ -298,12 +296,6 @@ pub fn length_with_unit(text: &str) -> Result<f64, String> {
 /// A height of either sign, m: a number with its unit, or of millimetres.
 pub fn height(text: &str) -> Result<f64, String> {
     metres(text)
-}
-
-/// A direction that points up.
-pub fn up(text: &str) -> Result<Up, String> {
-    Up::of(text)
-        .ok_or_else(|| format!("invalid direction {text:?}: expected x, y, z, -x, -y or -z"))
 }
 
 /// `X0,X1,Y0,Y1,Z0,Z1`, in millimetres or with units, each smaller end first; m.

@@ -3,6 +3,7 @@
 use super::key::Assumed;
 use super::limits::Limits;
 use std::path::{Path, PathBuf};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use fluxform_numerics::axis::Axis;
 
@@ -102,13 +103,18 @@ pub struct Core {
 }
 
 /// How the neighbours' cores are treated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Coupling {
     /// All cores respond to each driven coil.
     Full,
     /// Superposition of single coils.
     None,
 }
+
+fluxform_base::choices!(Coupling, Polarity, MagnetModel);
 
 /// The array of identical coils, axes parallel to z, top faces at z = 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,7 +141,10 @@ pub struct ArrayGrid {
 }
 
 /// Which way a positive current pushes the magnet on the coil's axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Polarity {
     /// Up: the moment points down, m_z < 0.
     Repel,
@@ -144,7 +153,10 @@ pub enum Polarity {
 }
 
 /// How the magnet's force is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum MagnetModel {
     /// A point dipole at the magnet's centre (eq. 5).
     Dipole,

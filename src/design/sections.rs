@@ -228,10 +228,7 @@ pub fn array(mut s: Section<'_>) -> ArrayDraft {
             }
         }
     };
-    let coupling = s.choice(
-        "coupling",
-        &[("full", Coupling::Full), ("none", Coupling::None)],
-    );
+    let coupling = s.choice("coupling");
     let gain = s.numbers("gain", &Rule::any(""));
     s.finish();
     ArrayDraft {
@@ -278,11 +275,6 @@ pub struct MagnetDraft {
 }
 
 pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
-    let polarities = [("repel", Polarity::Repel), ("attract", Polarity::Attract)];
-    let models = [
-        ("dipole", MagnetModel::Dipole),
-        ("cylinder", MagnetModel::Cylinder),
-    ];
     let tilt = Rule::any("degrees").bound(Bound::Within(-180.0, 180.0));
     let draft = MagnetDraft {
         diameter: s
@@ -296,8 +288,8 @@ pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
                 1.1579e6,
             )
             .value,
-        polarity: s.choice_or_first("polarity", &polarities),
-        model: s.choice_or_first("model", &models),
+        polarity: s.choice_or_first("polarity"),
+        model: s.choice_or_first("model"),
         tilt_deg: s.tuple("tilt_deg", &tilt),
         passive_force: s.flag_or("passive_force", false),
     };

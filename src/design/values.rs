@@ -1,5 +1,6 @@
 //! The typed values of a section: numbers, lists, axes, texts, choices.
 
+use fluxform_base::choice::Choice;
 use toml::Spanned;
 use toml::de::DeValue;
 
@@ -318,36 +319,29 @@ impl<'a> Section<'a> {
         None
     }
 
-    /// One of `options` by name, the first where absent or at fault.
-    ///
-    /// # Panics
-    /// If there are no options.
-    pub fn choice_or_first<T: Copy>(
-        &mut self,
-        key: &'static str,
-        options: &[(&'static str, T)],
-    ) -> T {
-        let (first, value) = options[0];
-        let without = || Without::Value(format!("{first:?}"));
-        self.list(key, || Accepts::any(choices(options)), without);
+    /// A variant of `T` by name, the first where absent or at fault.
+    pub fn choice_or_first<T: Choice>(&mut self, key: &'static str) -> T {
+        let first = T::VARIANTS[0];
+        let name: &str = first.into();
+        self.list(
+            key,
+            || Accepts::any(choices::<T>()),
+            || Without::Value(format!("{name:?}")),
+        );
         if !self.has(key) {
-            self.assume(key, format!("{first:?}"));
+            self.assume(key, format!("{name:?}"));
         }
-        self.choice(key, options).unwrap_or(value)
+        self.choice(key).unwrap_or(first)
     }
 
-    /// One of `options` by name; `None` where absent or at fault.
-    pub fn choice<T: Copy>(
-        &mut self,
-        key: &'static str,
-        options: &[(&'static str, T)],
-    ) -> Option<T> {
-        self.list(key, || Accepts::any(choices(options)), || Without::Nothing);
+    /// A variant of `T` by name; `None` where absent or at fault.
+    pub fn choice<T: Choice>(&mut self, key: &'static str) -> Option<T> {
+        self.list(key, || Accepts::any(choices::<T>()), || Without::Nothing);
         let text = self.text(key)?;
-        if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
-            return Some(*value);
+        if let Ok(value) = text.value.parse() {
+            return Some(value);
         }
-        let names: Vec<&str> = options.iter().map(|(name, _)| *name).collect();
+        let names: Vec<&str> = T::VARIANTS.iter().map(|&one| one.into()).collect();
         let listed: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
         let message = format!(
             "expected {}, found {}",
@@ -481,11 +475,9 @@ fn of_tuple(count: usize, rule: &Rule) -> Accepts {
     of_rule(&format!("{count} numbers"), rule)
 }
 
-fn choices<T>(options: &[(&'static str, T)]) -> String {
-    let names: Vec<String> = options
-        .iter()
-        .map(|(name, _)| format!("`{name:?}`"))
-        .collect();
+fn choices<T: Choice>() -> String {
+    let names = T::VARIANTS.iter().map(|&one| -> &str { one.into() });
+    let names: Vec<String> = names.map(|name| format!("`{name:?}`")).collect();
     names.join(" or ")
 }
 

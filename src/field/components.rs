@@ -32,22 +32,9 @@ pub enum Components {
     All,
 }
 
+fluxform_base::choices!(Components);
+
 impl Components {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// The name in artefacts and on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    /// The components in words.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
-    }
-
     /// Number of independent components outside the sources, where the tensor is symmetric and has
     /// no trace: dB_z/dz; dB_x/dz, dB_y/dz, dB_z/dz; dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz; then B_x, B_y, B_z.
     #[must_use]

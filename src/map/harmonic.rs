@@ -309,11 +309,17 @@ impl Table {
         for (k, weight) in self.z.cardinal(z_m).into_iter().enumerate() {
             let layer = &self.layers[k];
             let (x, y) = (layer.x.cardinal(x_m), layer.y.cardinal(y_m));
+            let mut column = vec![0.0; x.len()];
             for (out, values) in out.iter_mut().zip(&self.values) {
                 let values = &values[self.starts[k]..self.starts[k + 1]];
-                let sum: f64 = (values.chunks_exact(x.len()).zip(&y))
-                    .map(|(row, y)| y * row.iter().zip(&x).map(|(v, x)| v * x).sum::<f64>())
-                    .sum();
+                // Along y first: many sums at a time.
+                column.fill(0.0);
+                for (row, y) in values.chunks_exact(x.len()).zip(&y) {
+                    for (sum, value) in column.iter_mut().zip(row) {
+                        *sum += y * value;
+                    }
+                }
+                let sum: f64 = column.iter().zip(&x).map(|(v, x)| v * x).sum();
                 *out += weight * sum;
             }
         }

@@ -4,7 +4,7 @@
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
 //! not computed. What is read is what was computed, to the bit.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -22,6 +22,7 @@ const BUILD: &str = env!("FLUXFORM_BUILD");
 use crate::design::Steel as Described;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::core_flux_density::{Inspection, peak_depth_m};
+use crate::field::steel::passive::{PassivePull, Region};
 use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
@@ -43,6 +44,8 @@ pub struct FieldStore {
     field: Origin,
     /// Of the design's array, once a shape needs it.
     inspection: OnceLock<Inspection>,
+    /// The pull that the design leaves out, over the region of the last shape.
+    pull: Mutex<Option<(Region, Arc<Option<PassivePull>>)>>,
 }
 
 impl FieldStore {
@@ -82,6 +85,7 @@ impl FieldStore {
             shapes,
             field,
             inspection: OnceLock::new(),
+            pull: Mutex::new(None),
         }
     }
 
@@ -167,16 +171,34 @@ impl<'a> ShapeField<'a> {
         store.remember(&format!("{shape}.{what}"), &origin, compute)
     }
 
-    /// As [`passive::left_out_z_n`].
+    /// The vertical pull of the unpowered steel at `points_m` where the design leaves it out, N; empty
+    /// without steel. It is solved once for objects that are about as high.
     ///
     /// # Errors
-    /// As [`passive::left_out_z_n`].
+    /// A magnet that touches the steel.
     pub fn pull_left_out_n(
         self,
         scene: &Scene,
         points_m: &[[f64; 3]],
     ) -> Result<Vec<f64>, RunError> {
-        self.at_points("pull", points_m, || passive::left_out_z_n(scene, points_m))
+        self.at_points("pull", points_m, || {
+            let region = passive::left_out_region(scene, points_m);
+            let solve = || passive::left_out(scene, region).map(Arc::new);
+            let pull = match self.cached {
+                Some((FieldStore { pull, .. }, _)) => {
+                    let mut held = pull.lock().unwrap_or_else(PoisonError::into_inner);
+                    match &*held {
+                        Some((of, pull)) if *of == region => Arc::clone(pull),
+                        _ => Arc::clone(&held.insert((region, solve()?)).1),
+                    }
+                }
+                None => solve()?,
+            };
+            let pull = pull.as_ref().as_ref();
+            Ok(pull.map_or_else(Vec::new, |pull| {
+                passive::left_out_z_n(scene, pull, points_m)
+            }))
+        })
     }
 
     /// The largest |B| in any core of the design's `array` at these currents, T, as
@@ -238,17 +260,22 @@ impl<'a> ShapeField<'a> {
         progress: &dyn Progress,
     ) -> Result<SceneMap, RunError> {
         let compute = || SceneMap::new(scene, solved, coils, grid, components, magnet, progress);
-        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
+        let Some((FieldStore { store, field, .. }, _)) = self.cached else {
             return compute();
         };
         let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
         let what = format!("{:?}", (coils, components, magnet));
-        let origin = [&grid.x_m, &grid.y_m, &grid.z_m]
-            .into_iter()
-            .fold(field.clone().and(what.as_bytes()), |origin, nodes| {
+        let of_grid = |origin: Origin| {
+            let axes = [&grid.x_m, &grid.y_m, &grid.z_m].into_iter();
+            axes.fold(origin, |origin, nodes| {
                 origin.and_numbers(nodes.iter().copied())
-            });
-        store.remember(&format!("{shape}.map"), &origin, compute)
+            })
+        };
+        // Objects as wide and as high have the same map; another design's takes its place.
+        let kind = Origin::of_build(components.name());
+        let name = format!("map-{}", of_grid(kind).short_name());
+        let origin = of_grid(field.clone().and(what.as_bytes()));
+        store.remember(&name, &origin, compute)
     }
 }
 

@@ -179,7 +179,7 @@ impl MapTask<'_> {
         } = *self;
         let lowest = lowest_plane(grid);
         let steel = solved.sources(scene, &lowest, magnet.reach_m, magnet.amplification)?;
-        let steel = steel.as_ref().and_then(SteelField::coupled);
+        let steel = steel.as_deref().and_then(SteelField::coupled);
         let steel = steel.ok_or_else(no_steel)?;
         // A grid through every place that a node of the magnet can take.
         let widest = widest(grid, magnet);

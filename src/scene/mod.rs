@@ -11,6 +11,7 @@ pub mod neighbours;
 pub mod passive;
 pub mod passive_map;
 mod passive_table;
+mod prepared_field;
 pub mod rated;
 pub mod single;
 pub mod sources;
@@ -339,7 +340,7 @@ impl<'a> Scene<'a> {
         };
         let (own, sources): (&dyn AxialSource, _) = match &table {
             Some(table) => (&**table, None),
-            None => (&self.winding, sources.as_ref()),
+            None => (&self.winding, sources.as_deref()),
         };
         for (rule, rows) in &groups {
             let portions = rows
@@ -374,10 +375,10 @@ impl<'a> Scene<'a> {
     ) -> Result<(), RunError> {
         let coils = self.coils.len();
         let whole = N > 1 || !rule.is_upright();
-        let parts = if whole {
-            Components::Gradient
-        } else {
-            Components::Gz
+        let parts = match (whole, rule.is_upright()) {
+            (false, _) => Components::Gz,
+            (true, true) => Components::Force,
+            (true, false) => Components::Gradient,
         };
         let share = if rule.nodes().len() > 1 || sources.is_some() {
             solved.evaluation_share()
@@ -446,11 +447,7 @@ impl<'a> Scene<'a> {
     pub fn array_geometry(&self) -> ArrayGeometry {
         ArrayGeometry {
             positions_m: self.design.array.positions_m.clone(),
-            coupling: match self.design.array.coupling {
-                Coupling::Full => "full",
-                Coupling::None => "none",
-            }
-            .to_owned(),
+            coupling: self.design.array.coupling.name().to_owned(),
             gain: self.design.array.gain.clone(),
         }
     }
@@ -471,16 +468,8 @@ impl<'a> Scene<'a> {
         let magnet = &self.design.magnet;
         MagnetSummary {
             moment_a_m2: self.moment_a_m2,
-            model: match magnet.model {
-                MagnetModel::Dipole => "dipole",
-                MagnetModel::Cylinder => "cylinder",
-            }
-            .to_owned(),
-            polarity: match magnet.polarity {
-                Polarity::Repel => "repel",
-                Polarity::Attract => "attract",
-            }
-            .to_owned(),
+            model: magnet.model.name().to_owned(),
+            polarity: magnet.polarity.name().to_owned(),
             diameter_m: magnet.diameter_m,
             length_m: magnet.length_m,
         }

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::passive_table::{region, scattered_z_n};
+use super::prepared_field::rounded_down;
 use super::{Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
@@ -13,6 +14,7 @@ use crate::field::steel::passive::magnet::{PassiveMagnet, dipoles};
 use crate::field::steel::passive::neighbours::Neighbours;
 use crate::field::steel::passive::reaction::{Reaction, ReactionResolution};
 use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
+use crate::numerics::axis::Axis;
 
 /// Tolerance of the pull, relative to its own length: a small force beside the coils'.
 pub const PASSIVE_TOLERANCE: f64 = 1e-3;
@@ -25,29 +27,47 @@ const TABLE_SHARE: f64 = 0.1;
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
 
-/// Whether [`left_out_z_n`] counts that cores magnetise each other.
+/// Whether [`left_out`] counts that cores magnetise each other.
 #[must_use]
 pub fn couples_left_out(scene: &Scene) -> bool {
     coupled(scene.design) && scene.coils.len() <= MOST_COUPLED
 }
 
-/// Vertical pull at `places_m` where a design leaves it out, N, to [`LEFT_OUT_TOLERANCE`]; empty
-/// without steel.
+/// The region about `places_m` over which the pull is solved where a design leaves it out: the whole
+/// workspace from a step of height below the lowest place on, so that most of a design's objects share it.
+#[must_use]
+pub(super) fn left_out_region(scene: &Scene, places_m: &[[f64; 3]]) -> Region {
+    let workspace = &scene.design.workspace;
+    let [x_m, y_m, [lowest_m, highest_m]] = region(places_m);
+    let around = |axis: &Axis, [from, to]: [f64; 2]| [axis.from.min(from), axis.to.max(to)];
+    let touches_m = scene.magnet_depth_m() + scene.core.as_ref().map_or(0.0, |c| c.shape.top_m);
+    let lowest_m = touches_m + rounded_down(lowest_m - touches_m);
+    Region {
+        x_m: around(&workspace.x_m, x_m),
+        y_m: around(&workspace.y_m, y_m),
+        z_m: [lowest_m, workspace.z_m.to.max(highest_m)],
+    }
+}
+
+/// The pull over `region` where a design leaves it out, to [`LEFT_OUT_TOLERANCE`]; `None` without steel.
 ///
 /// # Errors
 /// A magnet that touches the steel.
-pub fn left_out_z_n(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Vec<f64>, RunError> {
-    let Some(pulled) = pulled(scene, places_m, false) else {
-        return Ok(Vec::new());
+pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<PassivePull>, RunError> {
+    let Some(pulled) = pulled(scene, region, false) else {
+        return Ok(None);
     };
     let pulled = Pulled {
         coupled: couples_left_out(scene),
         ..pulled
     };
     let pull = PassivePull::new(&pulled, LEFT_OUT_TOLERANCE);
-    let pull = pull.map_err(|fault| too_close(&pulled, fault))?;
-    let aim = TABLE_SHARE * LEFT_OUT_TOLERANCE;
-    Ok(scattered_z_n(scene, &pull, places_m, aim))
+    pull.map(Some).map_err(|fault| too_close(&pulled, fault))
+}
+
+/// Vertical pull at `places_m` from [`left_out`], N; about as exact.
+pub(super) fn left_out_z_n(scene: &Scene, pull: &PassivePull, places_m: &[[f64; 3]]) -> Vec<f64> {
+    scattered_z_n(scene, pull, places_m, TABLE_SHARE * LEFT_OUT_TOLERANCE)
 }
 
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
@@ -73,7 +93,7 @@ pub fn pull_to(
     alone: bool,
     tolerance: f64,
 ) -> Result<Option<PassivePull>, RunError> {
-    let Some(pulled) = pulled(scene, places_m, alone) else {
+    let Some(pulled) = pulled(scene, about(places_m), alone) else {
         return Ok(None);
     };
     PassivePull::new(&pulled, tolerance)
@@ -92,7 +112,7 @@ pub fn direct_z_n(
     places_m: &[[f64; 3]],
     tolerance: f64,
 ) -> Result<Option<Vec<f64>>, RunError> {
-    let Some(pulled) = pulled(scene, places_m, false) else {
+    let Some(pulled) = pulled(scene, about(places_m), false) else {
         return Ok(None);
     };
     let shape = pulled.shape;
@@ -147,9 +167,8 @@ pub fn direct_z_n(
 }
 
 /// Arguments of the pull's solvers; `None` without steel.
-fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pulled<'a>> {
+fn pulled<'a>(scene: &'a Scene, region: Region, alone: bool) -> Option<Pulled<'a>> {
     let core = scene.core.as_ref()?;
-    let [x_m, y_m, z_m] = region(places_m);
     let magnet = &scene.design.magnet;
     Some(Pulled {
         shape: core.shape,
@@ -165,8 +184,13 @@ fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pu
             diameter_m: magnet.diameter_m,
             length_m: magnet.length_m,
         }),
-        region: Region { x_m, y_m, z_m },
+        region,
     })
+}
+
+fn about(places_m: &[[f64; 3]]) -> Region {
+    let [x_m, y_m, z_m] = region(places_m);
+    Region { x_m, y_m, z_m }
 }
 
 fn too_close(pulled: &Pulled, fault: NoPull) -> RunError {

@@ -373,13 +373,14 @@ fn tabulated_z_n(
     let table = layout.filled(pull);
     let mut forces_n: Vec<f64> = places_m.par_iter().map(|at| table.at(*at)).collect();
     let compared = (0..COMPARED).map(|k| (2 * k + 1) * places_m.len() / (2 * COMPARED));
-    let (told, places): (Vec<f64>, Vec<_>) = compared.map(|i| (forces_n[i], places_m[i])).unzip();
+    let (reported, places): (Vec<f64>, Vec<_>) =
+        compared.map(|i| (forces_n[i], places_m[i])).unzip();
     // Forces fall with the height: beside each the largest of those that are no higher counts.
     let sure = pull.forces_z_n(&places);
     let holds = (0..COMPARED).all(|k| {
         let at_height = (0..COMPARED).filter(|other| places[*other][2] >= places[k][2]);
         let size = at_height.fold(0.0_f64, |most, other| most.max(sure[other].abs()));
-        (told[k] - sure[k]).abs() <= MISSES * aim * size
+        (reported[k] - sure[k]).abs() <= MISSES * aim * size
     });
     if !holds {
         return None;
@@ -509,14 +510,14 @@ mod tests {
             .collect();
         let pull = pull_to(&scene, &places, false, 1e-2).unwrap().unwrap();
         let aim = 1e-3;
-        let told = tabulated_z_n(&scene, &pull, &places, aim).expect("a table that holds");
+        let reported = tabulated_z_n(&scene, &pull, &places, aim).expect("a table that holds");
         let some: Vec<usize> = (0..places.len()).step_by(97).collect();
         let sure = pull.forces_z_n(&some.iter().map(|i| places[*i]).collect::<Vec<_>>());
         for (i, sure) in some.iter().zip(sure) {
             assert!(
-                (told[*i] / sure - 1.0).abs() < 5e-3,
+                (reported[*i] / sure - 1.0).abs() < 5e-3,
                 "{i}: {} {sure}",
-                told[*i]
+                reported[*i]
             );
         }
         // Close to the steel it varies too fast for a table to pay.

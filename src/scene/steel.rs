@@ -1,8 +1,11 @@
 //! The solved steel of a scene, and the field it adds.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::core_material::{Material, SceneCore};
+use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
 use crate::field::steel::CLOSEST;
@@ -56,6 +59,9 @@ pub struct Solved {
     /// coupled follow the curve at the rated current; those that are coupled are linear, of the
     /// permeability at the mean |B| of one coil alone at the rated current.
     pub relative_permeability: f64,
+    /// The field as it was last prepared.
+    #[serde(skip)]
+    prepared: PreparedField,
 }
 
 impl Solved {
@@ -67,6 +73,7 @@ impl Solved {
             tolerance,
             steel_error: 0.0,
             relative_permeability: 1.0,
+            prepared: PreparedField::default(),
         }
     }
 
@@ -171,25 +178,27 @@ impl Solved {
         points_m: &[[f64; 3]],
         reach_m: f64,
         amplification: f64,
-    ) -> Result<Option<SteelField>, RunError> {
+    ) -> Result<Option<Arc<SteelField>>, RunError> {
         let Some(core) = &scene.core else {
             return Ok(None);
         };
         let (lowest_m, distance_m) = clearance_m(scene, core, points_m, reach_m)?;
-        Ok(self.sources_at(lowest_m, distance_m, amplification))
+        Ok(self.sources_at(scene, [lowest_m, distance_m], amplification))
     }
 
-    /// The steel's field at places no lower than `lowest_m` and no closer to a core than
-    /// `distance_m`, whose errors may grow by `amplification`; `None` without steel.
+    /// The steel's field at places no lower and no closer to a core than `clearances_m`, whose errors
+    /// may grow by `amplification`; `None` without steel.
     #[must_use]
     pub fn sources_at(
         &self,
-        lowest_m: f64,
-        distance_m: f64,
+        scene: &Scene,
+        clearances_m: [f64; 2],
         amplification: f64,
-    ) -> Option<SteelField> {
+    ) -> Option<Arc<SteelField>> {
+        let top_m = scene.core.as_ref()?.shape.top_m;
         let tolerance = EVALUATION_SHARE * self.tolerance / amplification;
-        self.steel().field(lowest_m, distance_m, tolerance)
+        let prepared = &self.prepared;
+        prepared.of(self.steel(), top_m, clearances_m, tolerance)
     }
 }
 
@@ -297,6 +306,7 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
             steel_error: array.relative_error,
             steel: Steel::Coupled(Box::new(array)),
             relative_permeability,
+            prepared: PreparedField::default(),
         });
     }
     let (alone, steel_error) = match at_current {
@@ -331,5 +341,6 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         steel_error,
         steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
+        prepared: PreparedField::default(),
     })
 }

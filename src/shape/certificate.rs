@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use crate::deviation::{
     Faces, Interval, Lattice, Looks, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
@@ -17,16 +18,21 @@ use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// How much is looked into.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Certify {
-    /// Heights alone.
+    /// Heights alone
     #[default]
     No,
-    /// The vertical difference and the tessellation.
+    /// The vertical difference and the tessellation
     Vertical,
-    /// Also the Hausdorff distance.
+    /// Also the Hausdorff distance
     Distance,
 }
+
+fluxform_base::choices!(Certify);
 
 /// How the facets' deviation from the surface meant is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,6 +7,7 @@ mod unit;
 pub use read::{keys, keys_of};
 
 use std::path::PathBuf;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use crate::bodies::BodyOptions;
 use fluxform_base::force_direction::RequestedForce;
@@ -135,48 +136,32 @@ pub struct Fit {
 }
 
 /// A direction of a file that points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Up {
-    /// +x.
+    /// +x
     X,
-    /// +y, as in many programs that draw.
+    /// +y, as in many programs that draw
     Y,
-    /// +z.
+    /// +z
     #[default]
     Z,
-    /// -x.
+    /// -x
+    #[strum(serialize = "-x")]
     MinusX,
-    /// -y.
+    /// -y
+    #[strum(serialize = "-y")]
     MinusY,
-    /// -z.
+    /// -z
+    #[strum(serialize = "-z")]
     MinusZ,
 }
 
+fluxform_base::choices!(Up);
+
 impl Up {
-    /// Every direction and its name.
-    pub const NAMES: [(&str, Self); 6] = [
-        ("x", Self::X),
-        ("y", Self::Y),
-        ("z", Self::Z),
-        ("-x", Self::MinusX),
-        ("-y", Self::MinusY),
-        ("-z", Self::MinusZ),
-    ];
-
-    /// As flags, keys and records have it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        let known = Self::NAMES.iter().find(|(_, up)| *up == self);
-        known.map_or("z", |(name, _)| name)
-    }
-
-    /// The direction of a name.
-    #[must_use]
-    pub fn of(name: &str) -> Option<Self> {
-        let known = Self::NAMES.iter().find(|(known, _)| *known == name);
-        known.map(|(_, up)| *up)
-    }
-
     /// The rotation about x, then y, then z that turns it to +z, degrees.
     #[must_use]
     pub(super) fn turn_deg(self) -> [f64; 3] {

@@ -1,18 +1,24 @@
 //! Grid points without surface inside the silhouette: found, and filled when asked to.
 
 use crate::height::{Grid, Sample};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Treatment of holes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Holes {
-    /// They give no points, like what lies outside.
+    /// They give no points, like what lies outside
     #[default]
     Skip,
-    /// A membrane is spanned over them.
+    /// A membrane is spanned over them
     Fill,
-    /// They are refused.
+    /// They are refused
     Error,
 }
+
+fluxform_base::choices!(Holes);
 
 /// Sweeps over a hole, at most, for each of its points along the longer side.
 const SWEEPS: usize = 40;

@@ -127,10 +127,10 @@ fn init_sets_keys_and_replaces_nothing_without_force() {
         .run(&["init", "desk", "--set", "array.pitch_mm=10"])
         .ends(3)
         .says(&["pitch"]);
-    let told = place
+    let reported = place
         .run(&["init", "coil", "--out", "new", "--format", "json"])
         .ends(0)
         .json();
-    assert_eq!(told["design"], "new/coil.toml");
+    assert_eq!(reported["design"], "new/coil.toml");
     place.run(&["evaluate", "new/coil.toml"]).ends(0);
 }

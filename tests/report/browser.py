@@ -116,15 +116,15 @@ class Browser:
         """Everything that went wrong since the start: exceptions, console, policy, network."""
         found = []
         for event in self.events:
-            method, told = event.get("method"), event.get("params", {})
+            method, reported = event.get("method"), event.get("params", {})
             if method == "Runtime.exceptionThrown":
-                found.append(told["exceptionDetails"].get("exception", {}).get("description", "?"))
-            elif method == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning"):
-                found.append(str(told["args"]))
-            elif method == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-                found.append(told["entry"]["text"])
+                found.append(reported["exceptionDetails"].get("exception", {}).get("description", "?"))
+            elif method == "Runtime.consoleAPICalled" and reported["type"] in ("error", "warning"):
+                found.append(str(reported["args"]))
+            elif method == "Log.entryAdded" and reported["entry"]["level"] in ("error", "warning"):
+                found.append(reported["entry"]["text"])
             elif method == "Network.requestWillBeSent":
-                url = told["request"]["url"]
+                url = reported["request"]["url"]
                 if not url.startswith(("file:", "data:", "about:")):
                     found.append(f"asked for {url}")
         return found
@@ -174,12 +174,12 @@ class Browser:
 
 
 def check(page):
-    browser, told = Browser(), {}
+    browser, reported = Browser(), {}
 
     def expect(what, seen):
-        told[what] = seen
+        reported[what] = seen
         if not seen:
-            told.setdefault("failed", []).append(what)
+            reported.setdefault("failed", []).append(what)
 
     for width, mobile in [(1280, False), (390, True)]:
         browser.open(page, width, 844, dark=mobile, mobile=mobile)
@@ -238,12 +238,12 @@ def check(page):
     )
     expect("everything that can be touched has a name", unnamed == 0)
     expect("no fault is logged", not browser.faults())
-    told["faults"] = browser.faults()
-    told["first paint ms"] = browser.value(
+    reported["faults"] = browser.faults()
+    reported["first paint ms"] = browser.value(
         "(performance.getEntriesByName('first-contentful-paint')[0] || {}).startTime"
     )
-    print(json.dumps(told, indent=1))
-    sys.exit(1 if "failed" in told else 0)
+    print(json.dumps(reported, indent=1))
+    sys.exit(1 if "failed" in reported else 0)
 
 
 def turns(browser, expect):
@@ -277,19 +277,19 @@ def turns(browser, expect):
 
 
 def slides(browser, expect):
-    told = "document.querySelector('#draw-field output').textContent"
-    before = browser.value(told)
+    reported = "document.querySelector('#draw-field output').textContent"
+    before = browser.value(reported)
     browser.value("document.querySelector('#draw-field input').focus()")
     browser.key("ArrowRight")
     browser.key("ArrowRight")
     browser.settle()
-    expect("the slider changes the height", "mm" in before and browser.value(told) != before)
+    expect("the slider changes the height", "mm" in before and browser.value(reported) != before)
     browser.value(
         "(() => { const s = document.querySelector('#draw-field select'); s.value = s.options.length - 1;"
         " s.dispatchEvent(new Event('change')); })()"
     )
     browser.mouse("mouseMoved", *browser.middle("#draw-field canvas"))
-    expect("a coil alone is told per ampere", "mT/m/A" in browser.tip())
+    expect("a coil alone is reported per ampere", "mT/m/A" in browser.tip())
 
 
 def shot(page, folder):

@@ -3,14 +3,28 @@
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
 use crate::json::{JsonError, to_json};
 use fluxform_base::accuracy::CertificateKind;
 
 /// How a point ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Status {
     /// Computed to the tolerance.
     Done,
@@ -24,19 +38,9 @@ pub enum Status {
     Failed,
 }
 
-impl Status {
-    /// Its name in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::AccuracyNotReached => "accuracy_not_reached",
-            Self::Infeasible => "infeasible",
-            Self::Unbounded => "unbounded",
-            Self::Failed => "failed",
-        }
-    }
+fluxform_base::choices!(Status);
 
+impl Status {
     /// Whether there is a coil.
     #[must_use]
     pub(crate) fn has_row(self) -> bool {
@@ -172,8 +176,8 @@ impl PointFile {
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let point: Self = serde_json::from_slice(bytes).ok()?;
         let whole = point.digest() == point.point_sha256;
-        let told = point.status.has_row() == point.row.is_some();
-        (whole && told).then_some(point)
+        let reported = point.status.has_row() == point.row.is_some();
+        (whole && reported).then_some(point)
     }
 
     /// Whether `bytes`, which are no whole point, may be what a lost system left of one: a beginning of

@@ -97,11 +97,11 @@ pub(super) fn why_none(
         });
     }
     // The driver's side is the plainer story.
-    let told = problems
+    let reported = problems
         .iter()
         .find(|s| s.contradiction.is_some() && s.problem.regime == Regime::Driver)
         .or(problems.iter().find(|s| s.contradiction.is_some()));
-    Ok(match told.and_then(|s| s.contradiction.clone()) {
+    Ok(match reported.and_then(|s| s.contradiction.clone()) {
         Some(contradiction) => OptimumStatus::Contradictory(contradiction),
         None => OptimumStatus::Infeasible {
             violations: Vec::new(),

@@ -1,6 +1,7 @@
 //! The result of an optimisation.
 
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::domain::Contradiction;
 use super::model::{Strand, Window};
@@ -176,8 +177,11 @@ impl BestCoil {
 }
 
 /// In what a coil may be better than the strongest one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, IntoStaticStr, VariantArray, Serialize,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Advantage {
     /// Its length.
     Shorter,
@@ -189,20 +193,11 @@ pub enum Advantage {
     Windable,
 }
 
+fluxform_base::choices!(Advantage);
+
 impl Advantage {
     /// Every one that has less of something, in the order of `Advantage::amounts`.
-    pub const ALL: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
-
-    /// The word in artefacts, on screen and on pages.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shorter => "shorter",
-            Self::Lighter => "lighter",
-            Self::Cooler => "cooler",
-            Self::Windable => "windable",
-        }
-    }
+    pub const LESS: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
 
     /// Length, m, mass of the wire, kg, and heat, W, of `coil`.
     pub(super) fn amounts(coil: &BestCoil) -> [f64; 3] {
@@ -241,7 +236,7 @@ impl Alternative {
         let amounts = Advantage::amounts(coil)
             .into_iter()
             .zip(Advantage::amounts(best));
-        let better = Advantage::ALL
+        let better = Advantage::LESS
             .into_iter()
             .zip(amounts)
             .filter(|(advantage, (ours, theirs))| {

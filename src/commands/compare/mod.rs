@@ -216,7 +216,7 @@ pub fn run(
     let difference = StageAccuracy {
         estimate: error,
         relative_to: "1 just-noticeable difference".to_owned(),
-        method: "first order: the error of every coil's force at the places told".to_owned(),
+        method: "first order: the error of every coil's force at the places given".to_owned(),
     };
     let accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
     Ok(CompareReport {

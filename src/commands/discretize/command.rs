@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::scattered::{self, ScatteredSummary};
 use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with};
@@ -20,7 +20,7 @@ use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, length_error, mm, number};
 use crate::cli::start::begin;
-use crate::cli::values::FileArgument;
+use crate::cli::values::{self, FileArgument};
 use crate::scene::cost::of_points;
 use crate::shape::certificate::Certify;
 use crate::shape::deviation::CERTIFY_SECONDS;
@@ -63,11 +63,11 @@ pub struct Discretize {
     pub(super) out: FileArgument,
     /// Grid points without surface inside the silhouette: leave them out, fill them from around,
     /// or refuse the surface
-    #[arg(long, hide_short_help = true, value_enum, default_value_t = HolesFlag::Skip)]
-    holes: HolesFlag,
+    #[arg(long, hide_short_help = true, default_value = Holes::default().name(), value_parser = values::named::<Holes>())]
+    holes: Holes,
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
-    #[arg(long, hide_short_help = true, value_enum, default_value_t = CertifyFlag::Vertical)]
-    certify: CertifyFlag,
+    #[arg(long, hide_short_help = true, default_value = Certify::Vertical.name(), value_parser = values::named::<Certify>())]
+    certify: Certify,
     /// What --certify may take, in seconds of one core about; where it is spent, the points come
     /// without a certificate and a warning says so
     #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
@@ -98,20 +98,6 @@ pub struct Discretize {
     pub(super) writing: Writing,
     #[command(flatten)]
     pub(super) surface: SurfaceFlags,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum HolesFlag {
-    Skip,
-    Fill,
-    Error,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum CertifyFlag {
-    No,
-    Vertical,
-    Distance,
 }
 
 impl Discretize {
@@ -184,16 +170,8 @@ impl Discretize {
 
     fn options(&self) -> PointsOptions {
         PointsOptions {
-            holes: match self.holes {
-                HolesFlag::Skip => Holes::Skip,
-                HolesFlag::Fill => Holes::Fill,
-                HolesFlag::Error => Holes::Error,
-            },
-            certify: match self.certify {
-                CertifyFlag::No => Certify::No,
-                CertifyFlag::Vertical => Certify::Vertical,
-                CertifyFlag::Distance => Certify::Distance,
-            },
+            holes: self.holes,
+            certify: self.certify,
             certify_seconds: self.certify_seconds,
             picture: self.plot.is_some(),
             weights: self.weights.weights,

@@ -219,20 +219,10 @@ impl PointsOptions {
             picture: _,
             weights,
         } = *self;
-        let holes = match holes {
-            Holes::Skip => "skip",
-            Holes::Fill => "fill",
-            Holes::Error => "error",
-        };
-        let certify = match certify {
-            Certify::No => "no",
-            Certify::Vertical => "vertical",
-            Certify::Distance => "distance",
-        };
         Options::of(&PointsAsked {
             weights,
-            holes: Some(holes),
-            certify: Some(certify),
+            holes: Some(holes.name()),
+            certify: Some(certify.name()),
             certify_seconds: (certify_seconds != CERTIFY_SECONDS).then_some(certify_seconds),
             max_deviation_m: None,
             widest_m: None,

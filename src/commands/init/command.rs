@@ -1,9 +1,9 @@
 //! `init`: its arguments, its questions and its text.
 
+use crate::choice::Choice;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use toml::Value;
 
@@ -15,7 +15,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::printer::{Printer, Stream, ask, can_ask};
 use crate::cli::start::folder;
-use crate::cli::values::{FileArgument, setting};
+use crate::cli::values::{self, FileArgument, setting};
 
 /// Write a design and a shape to begin with
 ///
@@ -33,10 +33,10 @@ use crate::cli::values::{FileArgument, setting};
 ]))]
 pub struct Init {
     /// What to begin with [default: asked at a terminal, else seed]
-    #[arg(value_name = "TEMPLATE", value_parser = start())]
+    #[arg(value_name = "TEMPLATE", value_parser = values::named::<Start>())]
     template: Option<Start>,
     /// The object
-    #[arg(long, value_name = "OBJECT", value_parser = object())]
+    #[arg(long, value_name = "OBJECT", value_parser = values::named::<Object>())]
     object: Option<Object>,
     /// Name of the design [default: that of the template]
     #[arg(long, value_name = "NAME")]
@@ -49,21 +49,6 @@ pub struct Init {
     out: FileArgument,
     #[command(flatten)]
     writing: Writing,
-}
-
-fn start() -> impl TypedValueParser<Value = Start> {
-    let of = |one: &Start| PossibleValue::new(one.name()).help(one.meaning());
-    PossibleValuesParser::new(Start::ALL.iter().map(of)).try_map(|name| {
-        let found = Start::ALL.into_iter().find(|one| one.name() == name);
-        found.ok_or("no such template")
-    })
-}
-
-fn object() -> impl TypedValueParser<Value = Object> {
-    PossibleValuesParser::new(Object::ALL.map(Object::name)).try_map(|name| {
-        let found = Object::ALL.into_iter().find(|one| one.name() == name);
-        found.ok_or("no such object")
-    })
 }
 
 /// The files that were written.
@@ -119,18 +104,17 @@ impl Init {
     /// What is not given is asked; an empty answer takes what is in brackets.
     fn asked(&self) -> Result<Request, Failure> {
         let starts: Vec<String> = Start::ALL
+            .iter()
             .map(|one| format!("  {:6}{}", one.name(), one.meaning()))
-            .to_vec();
+            .collect();
         let question = format!("What to begin with?\n{}\n", starts.join("\n"));
-        let start = chosen(&question, &Start::ALL, Start::name)?;
-        let names = Object::ALL.map(Object::name).join(", ");
+        let start = chosen(&question)?;
         let object = match self.object {
             Some(object) => object,
-            None => chosen(
-                &format!("The object: {names}? "),
-                &Object::ALL,
-                Object::name,
-            )?,
+            None => {
+                let names: Vec<_> = Object::ALL.iter().map(|one| one.name()).collect();
+                chosen(&format!("The object: {}? ", names.join(", ")))?
+            }
         };
         let mut request = self.request(start, object);
         if request.name.is_none() {
@@ -155,11 +139,10 @@ impl Init {
     }
 }
 
-/// One of `all` by its name, the first where the answer is empty; asked again otherwise.
-fn chosen<T: Copy>(question: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T, Failure> {
+/// A variant by its name, the first where the answer is empty; asked again otherwise.
+fn chosen<T: Choice>(question: &str) -> Result<T, Failure> {
     loop {
-        let answer = ask(question, name(all[0]))?;
-        if let Some(one) = all.iter().copied().find(|one| name(*one) == answer) {
+        if let Ok(one) = ask(question, T::VARIANTS[0].into())?.parse() {
             return Ok(one);
         }
     }

@@ -3,6 +3,7 @@
 pub(crate) mod command;
 
 use std::path::Path;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use toml::{Table, Value};
 
@@ -14,40 +15,20 @@ use crate::numerics::axis::Axis;
 use crate::shape::document;
 
 /// A design to begin with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Start {
-    /// The reference array with steel cores.
+    /// nine coils with steel cores at a pitch of 50 mm
     Seed,
-    /// A small array in air.
+    /// sixteen small coils in air at a pitch of 20 mm
     Desk,
-    /// One coil.
+    /// one coil in air
     Coil,
 }
 
 impl Start {
-    /// Every one.
-    pub const ALL: [Self; 3] = [Self::Seed, Self::Desk, Self::Coil];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Seed => "seed",
-            Self::Desk => "desk",
-            Self::Coil => "coil",
-        }
-    }
-
-    /// What it is.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Self::Seed => "nine coils with steel cores at a pitch of 50 mm",
-            Self::Desk => "sixteen small coils in air at a pitch of 20 mm",
-            Self::Coil => "one coil in air",
-        }
-    }
-
     fn toml(self) -> &'static str {
         match self {
             Self::Seed => include_str!("../../../designs/seed.toml"),
@@ -79,38 +60,24 @@ workspace = { x_mm = [-10.0, 10.0, 21], y_mm = [-10.0, 10.0, 21], z_mm = [10.0, 
 ";
 
 /// An object to begin with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Object {
-    /// A plate.
+    /// a plate
     Flat,
-    /// Half a sphere.
+    /// half a sphere
     HalfSphere,
-    /// Half a cylinder.
+    /// half a cylinder
     HalfCylinder,
-    /// A plate that rises.
+    /// a plate that rises
     Wedge,
 }
 
+crate::choices!(Start, Object);
+
 impl Object {
-    /// Every one.
-    pub const ALL: [Self; 4] = [
-        Self::Flat,
-        Self::HalfSphere,
-        Self::HalfCylinder,
-        Self::Wedge,
-    ];
-
-    /// The primitive's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Flat => "flat",
-            Self::HalfSphere => "half-sphere",
-            Self::HalfCylinder => "half-cylinder",
-            Self::Wedge => "wedge",
-        }
-    }
-
     /// Its sizes inside a workspace, mm. In that of the seed they are the seed's.
     fn sizes_mm(self, [x, y, z]: [Axis; 3]) -> Vec<(&'static str, f64)> {
         let span = |axis: Axis| axis.to - axis.from;

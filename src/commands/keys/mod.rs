@@ -3,13 +3,17 @@
 pub(crate) mod command;
 
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::design::keys::{Key, Without, of_designs};
 use crate::shape::document;
 
 /// A document that has keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, IntoStaticStr, VariantArray, Serialize,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Document {
     /// A design file.
     Design,
@@ -17,19 +21,9 @@ pub enum Document {
     Shape,
 }
 
+crate::choices!(Document);
+
 impl Document {
-    /// Every document.
-    pub const ALL: [Self; 2] = [Self::Design, Self::Shape];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Design => "design",
-            Self::Shape => "shape",
-        }
-    }
-
     /// Its keys, in the order in which its reader asks for them.
     #[must_use]
     pub fn keys(self) -> Vec<Key> {
@@ -106,8 +100,8 @@ impl KeyEntry {
 /// Nothing has that name: the names that there are.
 pub fn keys(section: Option<&str>) -> Result<KeyList, String> {
     let all: Vec<KeyEntry> = Document::ALL
-        .into_iter()
-        .flat_map(|document| {
+        .iter()
+        .flat_map(|&document| {
             document
                 .keys()
                 .into_iter()
@@ -131,7 +125,10 @@ pub fn keys(section: Option<&str>) -> Result<KeyList, String> {
             return Ok(KeyList { keys });
         }
     }
-    let mut names: Vec<String> = Document::ALL.map(|one| one.name().to_owned()).to_vec();
+    let mut names: Vec<String> = Document::ALL
+        .iter()
+        .map(|one| one.name().to_owned())
+        .collect();
     for entry in all {
         if !entry.section.is_empty() && !names.contains(&entry.section) {
             names.push(entry.section);

@@ -6,6 +6,7 @@ pub mod scan;
 use crate::field::components::Components;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -236,7 +237,7 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Gro
 /// The field of every coil at places within reach of the steel's sources.
 pub(crate) struct FieldAt<'a> {
     scene: &'a Scene<'a>,
-    sources: Option<SteelField>,
+    sources: Option<Arc<SteelField>>,
 }
 
 impl<'a> FieldAt<'a> {
@@ -274,8 +275,8 @@ impl<'a> FieldAt<'a> {
         Ok(Self {
             scene,
             sources: solved.sources_at(
-                group.lowest_m - reach_m,
-                group.distance_m - reach_m,
+                scene,
+                [group.lowest_m - reach_m, group.distance_m - reach_m],
                 amplification,
             ),
         })

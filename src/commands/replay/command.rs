@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::output::{ReplayFiles, write_trajectory};
 use super::summary::TrajectorySource;
@@ -55,8 +55,8 @@ pub struct Replay {
     #[arg(value_name = "TRAJECTORY", conflicts_with = "synthesize")]
     trajectory: Option<FileArgument>,
     /// Make a trajectory up instead
-    #[arg(long, value_enum, value_name = "KIND")]
-    synthesize: Option<KindFlag>,
+    #[arg(long, value_name = "KIND", value_parser = values::named::<Kind>())]
+    synthesize: Option<Kind>,
     /// Which random movements are made up
     #[arg(
         long,
@@ -88,16 +88,6 @@ pub struct Replay {
     out: FileArgument,
     #[command(flatten)]
     writing: Writing,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum KindFlag {
-    /// Lines to and fro on the surface
-    Scan,
-    /// A circle on the surface
-    Circle,
-    /// Up to 14 mm off the surface, once outside the workspace
-    Explore,
 }
 
 /// A number above 0.
@@ -190,10 +180,7 @@ impl Replay {
             return Ok((trajectory, source));
         }
         let Some((synthesis, source)) = self.synthesis() else {
-            let kinds: Vec<String> = KindFlag::value_variants()
-                .iter()
-                .filter_map(|kind| Some(kind.to_possible_value()?.get_name().to_owned()))
-                .collect();
+            let kinds: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();
             return Err(Failure::Usage(format!(
                 "a trajectory is missing: name a CSV file with the columns t_s,x_m,y_m,z_m, or have one \
                  made up with --synthesize {}",
@@ -237,13 +224,11 @@ impl Replay {
 
     /// The requested synthesis, and its name for people.
     fn synthesis(&self) -> Option<(Synthesis, String)> {
-        let (kind, name) = match self.synthesize? {
-            KindFlag::Scan => (Kind::Scan, "scan lines".to_owned()),
-            KindFlag::Circle => (Kind::Circle, "a circle".to_owned()),
-            KindFlag::Explore => (
-                Kind::Explore,
-                format!("an exploring finger, seed {}", self.seed),
-            ),
+        let kind = self.synthesize?;
+        let name = match kind {
+            Kind::Scan => "scan lines".to_owned(),
+            Kind::Circle => "a circle".to_owned(),
+            Kind::Explore => format!("an exploring finger, seed {}", self.seed),
         };
         let synthesis = Synthesis {
             kind,

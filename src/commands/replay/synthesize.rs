@@ -1,6 +1,7 @@
 //! Trajectories made up: scan lines, a circle, an exploring finger. They depend on the seed alone.
 
 use std::f64::consts::TAU;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use serde::Serialize;
 
@@ -24,27 +25,20 @@ const TURN_S: f64 = 4.0;
 const RESOLUTION_M: f64 = 1e-6;
 
 /// Kinds of trajectories.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Kind {
-    /// Lines along x, to and fro, over the whole surface and on it.
+    /// Lines to and fro on the surface
     Scan,
-    /// A circle on the surface.
+    /// A circle on the surface
     Circle,
-    /// A finger that explores: up to 14 mm off the surface, and once outside the workspace.
+    /// Up to 14 mm off the surface, once outside the workspace
     Explore,
 }
 
-impl Kind {
-    /// Its name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Scan => "scan",
-            Self::Circle => "circle",
-            Self::Explore => "explore",
-        }
-    }
-}
+crate::choices!(Kind);
 
 /// A trajectory to be made up.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,7 +19,7 @@ use crate::force_direction::ForceOverride;
 use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
 use crate::shape::bodies::BodyOptions;
-use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource, Up};
+use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource};
 
 /// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
 const INPUTS_MAX: usize = 16;
@@ -278,7 +278,11 @@ fn raw(path: &Path, surface: &SurfaceOptions) -> RawSurface {
             translate_m: surface.translate_m,
             rotate_deg: surface.rotate_deg,
             seat: Seat {
-                up: surface.up.as_deref().and_then(Up::of).unwrap_or_default(),
+                up: surface
+                    .up
+                    .as_deref()
+                    .and_then(|up| up.parse().ok())
+                    .unwrap_or_default(),
                 center: surface.center,
                 rest_on_m: surface.rest_on_m,
                 fit: surface.fit_m.map(|box_m| Fit {

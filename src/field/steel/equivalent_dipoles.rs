@@ -7,11 +7,13 @@
 use crate::components::Components;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use super::CoreShape;
 use super::generatrix::Generatrix;
 use super::response::{RingPanel, Rings, ring_panels};
+use super::symmetry::{Images, Motion, centre_m, motions};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
@@ -132,23 +134,52 @@ fn dipole_places(rings: &Rings, angles: &[usize], positions_m: &[[f64; 2]]) -> V
 /// [`dipole_places`].
 fn dipole_moments(
     by_mode: &DMatrix<f64>,
-    modes: usize,
+    waves: &Waves,
     angles: &[usize],
     mut put: impl FnMut(usize, f64),
 ) {
     let mut place = 0;
     for (ring, angles) in angles.iter().enumerate() {
         let turn = TAU / *angles as f64;
-        for k in 0..*angles {
-            let theta = turn * (k as f64 + 0.5);
-            let mut moment = by_mode[(ring, 0)];
-            for mode in 1..modes {
-                let (s, c) = (mode as f64 * theta).sin_cos();
-                moment += c * by_mode[(ring, 2 * mode - 1)] + s * by_mode[(ring, 2 * mode)];
-            }
-            put(place + k, turn * moment);
+        let of_ring = by_mode.row(ring);
+        let of_ring_waves = waves.at(*angles);
+        for wave in of_ring_waves.chunks_exact(of_ring_waves.len() / angles) {
+            let moment: f64 = wave.iter().zip(of_ring.iter()).map(|(w, m)| w * m).sum();
+            put(place, turn * moment);
+            place += 1;
         }
-        place += angles;
+    }
+}
+
+/// The azimuthal waves of a layer at every angle of a ring, for rings of every number of angles: 1, then
+/// cosine and sine of every mode.
+struct Waves(BTreeMap<usize, Vec<f64>>);
+
+impl Waves {
+    fn new(modes: usize, angles: &[usize]) -> Self {
+        let of_ring = |angles: usize| {
+            let turn = TAU / angles as f64;
+            let at = move |k: usize| {
+                let theta = turn * (k as f64 + 0.5);
+                let waves = (1..modes).flat_map(move |mode| {
+                    let (s, c) = (mode as f64 * theta).sin_cos();
+                    [c, s]
+                });
+                std::iter::once(1.0).chain(waves)
+            };
+            (0..angles).flat_map(at).collect()
+        };
+        Self(
+            angles
+                .iter()
+                .map(|count| (*count, of_ring(*count)))
+                .collect(),
+        )
+    }
+
+    /// [angle, wave] of a ring of that many angles.
+    fn at(&self, angles: usize) -> &[f64] {
+        self.0.get(&angles).map_or(&[], |waves| waves)
     }
 }
 
@@ -192,6 +223,7 @@ impl DipoleTask<'_> {
         let a_core = places.len() / self.positions_m.len().max(1);
         let columns = drives.len();
         let mut moments = vec![0.0; places.len() * columns];
+        let waves = Waves::new(self.modes, &angles);
         moments
             .par_chunks_mut((a_core * columns).max(1))
             .enumerate()
@@ -199,7 +231,7 @@ impl DipoleTask<'_> {
                 for (column, drive) in drives.iter().enumerate() {
                     fluxform_base::progress::poll();
                     let by_mode = rings.moments(&layers(*drive, core));
-                    dipole_moments(&by_mode, self.modes, &angles, |place, moment| {
+                    dipole_moments(&by_mode, &waves, &angles, |place, moment| {
                         out[place * columns + column] = moment;
                     });
                 }
@@ -209,6 +241,7 @@ impl DipoleTask<'_> {
             top_m: shape.top_m,
             places,
             moments,
+            symmetry: Default::default(),
         }
     }
 
@@ -333,9 +366,19 @@ pub struct ArraySources {
     places: Vec<[f64; 6]>,
     /// Layer moments of every dipole, [dipole, drive], A m^2 per ampere.
     moments: Vec<f64>,
+    /// The array's centre, m, and its motions, where the drives are its coils; none otherwise.
+    symmetry: ([f64; 2], Vec<Motion>),
 }
 
 impl ArraySources {
+    /// The same, whose drives are the coils at `positions_m`, in their order: their symmetry is used.
+    pub(super) fn driven_by_coils(self, positions_m: &[[f64; 2]]) -> Self {
+        Self {
+            symmetry: (centre_m(positions_m), motions(positions_m)),
+            ..self
+        }
+    }
+
     pub(super) fn new(
         outline: &Generatrix,
         positions_m: &[[f64; 2]],
@@ -418,6 +461,20 @@ impl ArraySources {
     pub fn sample(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
         let columns = self.drives * parts.count();
         assert_eq!(out.len(), columns * points_m.len());
+        let (centre_m, motions) = &self.symmetry;
+        if motions.len() > 1 {
+            let images = Images::new(motions, *centre_m, points_m);
+            let mut sector = vec![0.0; columns * images.sector_m.len()];
+            self.sample_all(&images.sector_m, parts, &mut sector);
+            images.spread(parts, &sector, out);
+        } else {
+            self.sample_all(points_m, parts, out);
+        }
+    }
+
+    /// The same without the array's symmetry.
+    pub(super) fn sample_all(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
+        let columns = self.drives * parts.count();
         let chunks: Vec<Vec<f64>> = points_m
             .par_chunks(CHUNK)
             .map(|points| {

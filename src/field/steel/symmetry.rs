@@ -1,5 +1,9 @@
 //! Quarter turns and mirrors that map an array of identical coils to itself.
 
+use std::collections::HashMap;
+
+use crate::components::Components;
+
 /// A motion of the plane that maps the array to itself: a mirror theta -> -theta first, if
 /// `mirrored`, then quarter turns, both about the array's centre.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,6 +15,30 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Where a place goes, from the array's centre.
+    #[must_use]
+    pub fn image(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let y = if self.mirrored { -y } else { y };
+        match self.quarters {
+            0 => [x, y],
+            1 => [-y, x],
+            2 => [-x, -y],
+            _ => [y, -x],
+        }
+    }
+
+    /// The inverse of [`Motion::image`].
+    #[must_use]
+    pub fn origin(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [x, y] = match self.quarters {
+            0 => [x, y],
+            1 => [y, -x],
+            2 => [-x, -y],
+            _ => [-y, x],
+        };
+        [x, if self.mirrored { -y } else { y }]
+    }
+
     /// Where the k-th of `angles` (a multiple of four) regular angles about a coil's axis goes.
     #[must_use]
     pub fn angle(&self, k: usize, angles: usize) -> usize {
@@ -19,13 +47,19 @@ impl Motion {
     }
 }
 
+/// The mean of the coils' places, m.
+#[must_use]
+pub fn centre_m(positions_m: &[[f64; 2]]) -> [f64; 2] {
+    let count = positions_m.len() as f64;
+    positions_m.iter().fold([0.0, 0.0], |c, p| {
+        [c[0] + p[0] / count, c[1] + p[1] / count]
+    })
+}
+
 /// All motions of the array; the identity is the first.
 #[must_use]
 pub fn motions(positions_m: &[[f64; 2]]) -> Vec<Motion> {
-    let count = positions_m.len() as f64;
-    let centre = positions_m.iter().fold([0.0, 0.0], |c, p| {
-        [c[0] + p[0] / count, c[1] + p[1] / count]
-    });
+    let centre = centre_m(positions_m);
     let centred: Vec<[f64; 2]> = positions_m
         .iter()
         .map(|p| [p[0] - centre[0], p[1] - centre[1]])
@@ -38,32 +72,110 @@ pub fn motions(positions_m: &[[f64; 2]]) -> Vec<Motion> {
     let mut found = Vec::new();
     for mirrored in [false, true] {
         for quarters in 0..4 {
-            let image = |p: &[f64; 2]| {
-                let [x, mut y] = *p;
-                if mirrored {
-                    y = -y;
-                }
-                match quarters {
-                    0 => [x, y],
-                    1 => [-y, x],
-                    2 => [-x, -y],
-                    _ => [y, -x],
-                }
+            let motion = Motion {
+                coil: Vec::new(),
+                mirrored,
+                quarters,
             };
             let coil: Option<Vec<usize>> = centred
                 .iter()
-                .map(|p| centred.iter().position(|q| same(&image(p), q)))
+                .map(|p| centred.iter().position(|q| same(&motion.image(*p), q)))
                 .collect();
-            if let Some(coil) = coil {
-                found.push(Motion {
-                    coil,
-                    mirrored,
-                    quarters,
-                });
-            }
+            found.extend(coil.map(|coil| Motion { coil, ..motion }));
         }
     }
     found
+}
+
+/// Places closer than this to each other, in units of the farthest, are one.
+const SAME_PLACE: f64 = 1e-13;
+
+/// Places over a symmetric array as images of places in one sector of it, however many or few they are:
+/// what is found at a place does not depend on the others.
+pub(super) struct Images<'a> {
+    motions: &'a [Motion],
+    /// The different places in the sector, m.
+    pub(super) sector_m: Vec<[f64; 3]>,
+    /// Of every place the one in the sector, and the motion that takes it there.
+    origins: Vec<(usize, usize)>,
+}
+
+impl<'a> Images<'a> {
+    /// Of `points_m` over an array about `centre_m` that `motions` map to itself.
+    pub(super) fn new(motions: &'a [Motion], centre_m: [f64; 2], points_m: &[[f64; 3]]) -> Self {
+        let farthest = (points_m.iter().flatten()).fold(0.0_f64, |most, v| most.max(v.abs()));
+        let step = SAME_PLACE * farthest.max(f64::MIN_POSITIVE);
+        let mut sector_m = Vec::new();
+        let mut known = HashMap::new();
+        let origins = points_m
+            .iter()
+            .map(|[x, y, z]| {
+                let about = [x - centre_m[0], y - centre_m[1]];
+                // The sector is where the first coordinate, then the second, is largest.
+                let larger =
+                    |a: [f64; 2], b: [f64; 2]| a[0] > b[0] || (a[0] == b[0] && a[1] > b[1]);
+                let mut first = (0, about);
+                for (number, motion) in motions.iter().enumerate().skip(1) {
+                    let image = motion.image(about);
+                    if larger(image, first.1) {
+                        first = (number, image);
+                    }
+                }
+                let (motion, [dx, dy]) = first;
+                let place = [centre_m[0] + dx, centre_m[1] + dy, *z];
+                let key = place.map(|v| (v / step).round() as i64);
+                let index = *known.entry(key).or_insert_with(|| {
+                    sector_m.push(place);
+                    sector_m.len() - 1
+                });
+                (index, motion)
+            })
+            .collect();
+        Self {
+            motions,
+            sector_m,
+            origins,
+        }
+    }
+
+    /// Values at all places from those in the sector, both [drive, component, place], every coil being
+    /// a drive. Coils keep their sense of turning under a mirror, so that B maps as a polar vector.
+    pub(super) fn spread(&self, parts: Components, sector: &[f64], out: &mut [f64]) {
+        let (count, from_count, to_count) =
+            (parts.count(), self.sector_m.len(), self.origins.len());
+        for (drive, out) in out.chunks_exact_mut((count * to_count).max(1)).enumerate() {
+            for (place, (index, motion)) in self.origins.iter().enumerate() {
+                let motion = &self.motions[*motion];
+                let values = &sector[motion.coil[drive] * count * from_count..];
+                let at = |component: usize| values[component * from_count + index];
+                let mut put =
+                    |component: usize, value: f64| out[component * to_count + place] = value;
+                let mut put_vector = |[x, y, z]: [usize; 3]| {
+                    let [along_x, along_y] = motion.origin([at(x), at(y)]);
+                    put(x, along_x);
+                    put(y, along_y);
+                    put(z, at(z));
+                };
+                match parts {
+                    Components::Gz => put(0, at(0)),
+                    Components::Force => put_vector([0, 1, 2]),
+                    Components::Gradient | Components::All => {
+                        put_vector([2, 3, 4]);
+                        if parts == Components::All {
+                            put_vector([5, 6, 7]);
+                        }
+                        // Rows, then columns, of the part across the axis.
+                        let (xx, xy, yy) = (at(0), at(1), -at(0) - at(4));
+                        let [a, b] = [[xx, xy], [xy, yy]].map(|row| motion.origin(row));
+                        let [xx, _] = motion.origin([a[0], b[0]]);
+                        let [xy, _] = motion.origin([a[1], b[1]]);
+                        put(0, xx);
+                        put(1, xy);
+                    }
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Reading a shape file: text to a validated [`ShapeDocument`], or every fault in it.
 
 use std::path::Path;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use super::unit::{parse_unit, unit_names};
 use super::{
@@ -33,7 +34,9 @@ const SIZES: [&str; 7] = [
     "high_mm",
 ];
 
-#[derive(Clone, Copy)]
+/// A surface by its sizes alone.
+#[derive(Debug, Clone, Copy, EnumMessage, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 enum Kind {
     Flat,
     HalfSphere,
@@ -41,12 +44,14 @@ enum Kind {
     Wedge,
 }
 
-const KINDS: [(&str, Kind); 4] = [
-    ("flat", Kind::Flat),
-    ("half-sphere", Kind::HalfSphere),
-    ("half-cylinder", Kind::HalfCylinder),
-    ("wedge", Kind::Wedge),
-];
+fluxform_base::choices!(Kind);
+
+/// Points outside the workspace.
+#[derive(Debug, Clone, Copy, EnumMessage, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
+enum Outside {
+    Skip,
+}
 
 impl ShapeDocument {
     /// The shape that `text` describes, and the warnings about it. `path` names it in messages,
@@ -113,7 +118,7 @@ fn seat(root: &mut Section<'_>) -> Seat {
         root.ignore(&KEYS);
         return Seat::default();
     }
-    let up = root.choice("up", &Up::NAMES).unwrap_or_default();
+    let up = root.choice::<Up>("up").unwrap_or_default();
     let center = root.flag_or("center", false);
     let rest_on = root.number("rest_on_mm", &BODY_MM);
     let ends = root.tuple_if_given::<6>("fit_mm", &BODY_MM);
@@ -147,12 +152,8 @@ fn seat(root: &mut Section<'_>) -> Seat {
 
 /// The force that is requested over the surface.
 fn force(root: &mut Section<'_>) -> RequestedForce {
-    let directions = ForceDirection::ALL.iter().map(|d| (d.name(), *d));
-    let sizes = NormalForce::ALL.iter().map(|s| (s.name(), *s));
-    let directions: Vec<_> = directions.collect();
-    let sizes: Vec<_> = sizes.collect();
-    let direction = root.choice_or_first("force", &directions);
-    let normal_force = root.choice_or_first("normal_force", &sizes);
+    let direction: ForceDirection = root.choice_or_first("force");
+    let normal_force: NormalForce = root.choice_or_first("normal_force");
     if root.has("normal_force") && direction != ForceDirection::Normal {
         let message = "the force is not along the normal";
         root.fault("normal_force", message, "add force = \"normal\"");
@@ -176,7 +177,7 @@ fn bodies(root: &mut Section<'_>) -> BodyOptions {
 #[must_use]
 pub fn keys() -> Vec<Key> {
     let mut all: Vec<Key> = Vec::new();
-    for source in std::iter::once("surface").chain(KINDS.iter().map(|(name, _)| *name)) {
+    for source in std::iter::once("surface").chain(Kind::ALL.iter().map(|kind| kind.name())) {
         for key in keys_read(source) {
             if !all.iter().any(|known| known.path() == key.path()) {
                 all.push(key);
@@ -373,7 +374,7 @@ fn primitive(root: &mut Section<'_>) -> Option<SurfaceSource> {
         );
     }
     root.ignore(&["unit"]);
-    let Some(kind) = root.choice("primitive", &KINDS) else {
+    let Some(kind) = root.choice::<Kind>("primitive") else {
         root.ignore(&SIZES);
         return None;
     };
@@ -422,9 +423,8 @@ fn points(mut s: Section<'_>) -> Points {
     let is_given = s.has("x_mm") || s.has("y_mm");
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
-    s.choice_or_first("outside", &[("skip", ())]);
-    let names = [Weights::Equal, Weights::Area].map(|weights| (weights.name(), weights));
-    let weights = s.choice("weights", &names);
+    s.choice_or_first::<Outside>("outside");
+    let weights = s.choice("weights");
     let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
     if let Some([x, y]) = &grid
         && x.samples

@@ -1,0 +1,66 @@
+//! A solved steel's field, prepared once for all places that are about as close to the cores.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::field::steel::array_steel::{ArraySteel, SteelField};
+
+/// Clearances are rounded down to powers of two to one over this: places of one object, lifted, beside
+/// each other or fewer of them share what is prepared, whose cost grows with the clearance's inverse square.
+const STEPS_OF_TWO: f64 = 16.0;
+/// Preparations held at a time: that of points, and that of the map about them.
+const HELD: usize = 2;
+/// Most moments of a preparation that is held: of hundreds of coils they take gigabytes.
+const MOST_MOMENTS: usize = 4_000_000;
+
+/// Clearances and tolerance that a field is prepared for, to the bit.
+type Key = [u64; 3];
+
+/// The field of one solution as it was last prepared; copies of the solution share it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PreparedField(Arc<Mutex<Vec<(Key, Arc<SteelField>)>>>);
+
+impl PreparedField {
+    /// The field of `steel`, whose cores end at `top_m`, at places no lower than `lowest_m` and no closer
+    /// to a core than `distance_m`, to `tolerance`; `None` without steel. It depends on these alone, not on
+    /// what was prepared before.
+    pub(super) fn of(
+        &self,
+        steel: &dyn ArraySteel,
+        top_m: f64,
+        [lowest_m, distance_m]: [f64; 2],
+        tolerance: f64,
+    ) -> Option<Arc<SteelField>> {
+        let above_m = lowest_m - top_m;
+        let lowest_m = if above_m > 0.0 {
+            top_m + rounded_down(above_m)
+        } else {
+            lowest_m
+        };
+        let distance_m = rounded_down(distance_m);
+        let key = [lowest_m, distance_m, tolerance].map(f64::to_bits);
+        let held = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, field)) = held().iter().find(|(of, _)| *of == key) {
+            return Some(Arc::clone(field));
+        }
+        let field = Arc::new(steel.field(lowest_m, distance_m, tolerance)?);
+        if field
+            .coupled()
+            .is_none_or(|dipoles| dipoles.count() * dipoles.drives() <= MOST_MOMENTS)
+        {
+            let mut held = held();
+            held.truncate(HELD - 1);
+            held.insert(0, (key, Arc::clone(&field)));
+        }
+        Some(field)
+    }
+}
+
+/// `distance_m` on its step, or the same where it has none.
+pub(super) fn rounded_down(distance_m: f64) -> f64 {
+    let step = (STEPS_OF_TWO * distance_m.log2()).floor();
+    if step.is_finite() {
+        (step / STEPS_OF_TWO).exp2()
+    } else {
+        distance_m
+    }
+}
