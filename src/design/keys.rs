@@ -150,7 +150,6 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.wire_length_max_m", "length of the wire"),
     ("limits.core_field_max_t", "flux density in the core"),
     (
-<<<<<<< HEAD
         "limits.footprint_max_mm",
         "larger side of the rectangle that holds all coils",
     ),
@@ -162,7 +161,8 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "limits.array_settling_max_ms",
         "five time constants of the slowest coil among its neighbours",
-=======
+    ),
+    (
         "uncertainty.sensor_mm",
         "how far the magnet may be from where it is measured, along each axis",
     ),
@@ -177,7 +177,6 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "uncertainty.driver_percent",
         "by how much each driver's current may be off",
->>>>>>> vec
     ),
     (
         "target.height_mm",
