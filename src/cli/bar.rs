@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::quantity::force;
+use super::quantity::{force, si};
 use crate::progress::{Progress, stop_requested};
 
 /// Stages that end sooner are never drawn.
@@ -57,8 +57,8 @@ struct State {
     seconds: Vec<(String, f64)>,
     drawn: Option<ProgressBar>,
     finished: bool,
-    /// The best force that a search has found, N.
-    best_n: Option<f64>,
+    /// The best value that a search has found.
+    best: Option<String>,
 }
 
 #[derive(Debug)]
@@ -121,8 +121,8 @@ impl State {
         let message = if stop_requested() {
             format!("{name} (stopping)")
         } else {
-            match self.best_n {
-                Some(best_n) => format!("{name} {}", force(best_n)),
+            match &self.best {
+                Some(best) => format!("{name} {best}"),
                 None => name.clone(),
             }
         };
@@ -202,8 +202,13 @@ impl Progress for Bar {
         }
     }
 
-    fn improved(&self, value: f64) {
-        self.shared.lock().best_n = Some(value);
+    fn improved(&self, value: f64, unit: &'static str) {
+        let shown = match unit {
+            "x" => format!("x {value:.4}"),
+            "N" => force(value),
+            unit => si(value, unit),
+        };
+        self.shared.lock().best = Some(shown);
     }
 
     fn end(&self) {

@@ -2,6 +2,7 @@
 
 use super::limits::{self, Limits};
 use super::reader::{Located, Section};
+use super::search::{self, SearchSpace};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
 use fluxform_base::uncertainty::Uncertainty;
@@ -84,6 +85,7 @@ pub(super) struct Draft {
     pub(super) uncertainty: Uncertainty,
     pub(super) target_height: Located<f64>,
     pub(super) workspace: WorkspaceDraft,
+    pub(super) search: SearchSpace,
 }
 
 impl Draft {
@@ -106,6 +108,7 @@ impl Draft {
             uncertainty: sections::uncertainty(root.section("uncertainty")),
             target_height: sections::target_height_mm(root.section("target")),
             workspace: sections::workspace(root.section("workspace")),
+            search: search::read(root.section("search")),
         }
     }
 }

@@ -357,6 +357,35 @@ impl<'a> Section<'a> {
         None
     }
 
+    /// Variants of `T` by name, each once; empty where absent or at fault.
+    pub fn choices<T: Choice + PartialEq>(&mut self, key: &'static str) -> Vec<T> {
+        let value = || Accepts::any(format!("list of {}", choices::<T>()));
+        self.list(key, value, || Without::Nothing);
+        let Some(found) = self.found(key) else {
+            return Vec::new();
+        };
+        let mut chosen = Vec::new();
+        for item in self.items(key, found, "a list of names") {
+            let DeValue::String(text) = item.get_ref() else {
+                self.add_wrong_type(&self.path_of(key), item, "a name in quotes");
+                continue;
+            };
+            match text.parse::<T>() {
+                Ok(value) if !chosen.contains(&value) => chosen.push(value),
+                Ok(_) => self.fault(
+                    key,
+                    format!("{text:?} is there twice"),
+                    "give each name once",
+                ),
+                Err(_) => {
+                    let message = format!("expected {}, found {}", choices::<T>(), quoted(text));
+                    self.fault(key, message, "choose among them");
+                }
+            }
+        }
+        chosen
+    }
+
     /// True or false; the default where absent or at fault.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
         let value = || Accepts::any("true or false");

@@ -14,6 +14,7 @@ mod lambda;
 mod messages;
 mod mistakes;
 mod optimize;
+mod optimize_array;
 mod placement;
 mod scan;
 mod screen;

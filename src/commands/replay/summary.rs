@@ -164,16 +164,20 @@ pub struct DynamicsSummary {
     pub time_constant_max_s: f64,
     /// The bound of the coils' voltages, V; null without one.
     pub voltage_v: Option<f64>,
+    /// Bandwidth of the current loop, Hz; absent where drivers set voltages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bandwidth_hz: Option<f64>,
 }
 
 impl DynamicsSummary {
-    pub(super) fn of(drive: &Drive, bundle: &Bundle) -> Self {
+    pub(super) fn of(drive: &Drive, bundle: &Bundle, bandwidth_hz: Option<f64>) -> Self {
         let [shortest, longest] = drive.time_constants_s().unwrap_or_default();
         let rendering = bundle.map.runtime.rendering.as_ref();
         Self {
             time_constant_min_s: shortest,
             time_constant_max_s: longest,
             voltage_v: rendering.and_then(|rendering| rendering.voltage_v),
+            bandwidth_hz,
         }
     }
 }
