@@ -31,7 +31,7 @@ use crate::shape::certificate::Certificate;
 use crate::shape::document::ShapeDocument;
 
 /// Name of the folder beside a design's bundles.
-pub const STORE_FOLDER: &str = ".fluxform-kept";
+pub const STORE_FOLDER: &str = ".fluxform-cache";
 /// Most values of a map that is held for the next shape.
 const MOST_NODES_HELD: usize = 8_000_000;
 /// Entry of the design's steel.
