@@ -433,6 +433,7 @@ impl ArraySources {
             top_m,
             places,
             moments,
+            symmetry: Default::default(),
         }
     }
 
