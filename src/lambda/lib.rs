@@ -64,6 +64,7 @@ mod qr_reduction;
 mod rest;
 pub mod sideways;
 mod solve;
+pub mod uncertainty;
 mod vector_allocation;
 pub mod vector_feedback;
 mod wiring;

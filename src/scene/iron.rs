@@ -24,6 +24,8 @@ pub struct SceneIron {
     plate: Option<Plate>,
     bodies: Vec<(Body, f64)>,
     names: Vec<String>,
+    /// Height of the highest of it, m.
+    pub(super) top_m: f64,
     /// Flux density above which a warning is due: the least of all bodies, T.
     pub knee_t: f64,
 }
@@ -70,13 +72,20 @@ impl SceneIron {
             thickness_m: plate.thickness_m,
             chi: chi(plate.steel),
         });
+        let bodies: Vec<(Body, f64)> = design
+            .iron
+            .iter()
+            .map(|iron| (body(iron), chi(iron.steel)))
+            .collect();
+        let heights = bodies
+            .iter()
+            .flat_map(|(body, _)| body.places_m())
+            .map(|place| place[2]);
         let made = Self {
+            top_m: (heights.chain(plate.map(|plate| plate.top_m)))
+                .fold(f64::NEG_INFINITY, f64::max),
             plate,
-            bodies: design
-                .iron
-                .iter()
-                .map(|iron| (body(iron), chi(iron.steel)))
-                .collect(),
+            bodies,
             names: (0..design.iron.len())
                 .map(|k| format!("[[iron]] {k}"))
                 .collect(),
@@ -177,15 +186,6 @@ impl SceneIron {
         bodies.fold(f64::INFINITY, |least, body| {
             least.min(body.distance_m(place_m))
         })
-    }
-
-    /// Height of the highest of it, m.
-    pub(super) fn top_m(&self) -> f64 {
-        let places = self.bodies.iter().flat_map(|(body, _)| body.places_m());
-        places
-            .map(|place| place[2])
-            .chain(self.plate.map(|plate| plate.top_m))
-            .fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The largest |B| of `solved` at these currents, in it and in the cores.

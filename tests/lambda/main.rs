@@ -12,7 +12,9 @@ mod mirror;
 mod oracle;
 mod power;
 mod saturation;
+
 mod scale;
+mod uncertainty;
 mod vector_allocation;
 mod vector_feedback;
 mod vertices;

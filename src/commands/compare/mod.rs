@@ -374,7 +374,9 @@ impl Rendered {
 fn unusual(status: Status) -> Option<&'static str> {
     match status {
         Status::Solved => None,
-        Status::NothingWanted => Some("every height is zero: no force is wanted, lambda is null"),
+        Status::NothingWanted => {
+            Some("every height is zero: no force is requested, lambda is null")
+        }
         Status::NothingRendered => {
             Some("no current within the limits pushes the magnet up at its points: lambda is null")
         }

@@ -9,7 +9,8 @@ use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
 use crate::cli::args::{
-    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing,
+    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag,
+    Writing,
 };
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
@@ -61,6 +62,8 @@ pub struct Lambda {
     feedback: FeedbackFlags,
     #[command(flatten)]
     requested: ForceFlags,
+    #[command(flatten)]
+    uncertain: UncertaintyFlags,
     /// Draw error and currents over lambda, the errors over the surface and force against wanted
     /// force (SVG); `-` for standard output
     #[arg(long, value_name = "FILE")]
@@ -168,6 +171,7 @@ impl Lambda {
             }),
             picture: self.plot.is_some(),
             force: self.requested.into(),
+            uncertainty: self.uncertain.into(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(

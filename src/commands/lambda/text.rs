@@ -52,6 +52,9 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     if let Some(of) = &file.sideways {
         sheet.line("sideways", &describe::sideways(of));
     }
+    if let Some(of) = &file.uncertainty {
+        sheet.line("uncertain", &describe::uncertainty(of));
+    }
     if let Some(with_feedback) = &file.feedback {
         feedback_lines(&mut sheet, design, with_feedback);
     }
@@ -78,6 +81,14 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     let stages = file.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
+    if let Some(felt) = file
+        .headline
+        .as_ref()
+        .and_then(|headline| headline.felt.as_ref())
+    {
+        let (all, parts) = (describe::felt(felt), describe::felt_parts(felt));
+        sheet.line("finger", &format!("{all}\n{parts}"));
+    }
     if let Some(variants) = &file.variants {
         sheet.gap();
         sheet.raw(&table_of(variants));
@@ -180,7 +191,7 @@ fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlac
                 place.point
             )
         }
-        _ => format!("none: {}", reason.unwrap_or("no force is wanted")),
+        _ => format!("none: {}", reason.unwrap_or("no force is requested")),
     }
 }
 
@@ -324,7 +335,7 @@ fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) 
         sheet.line(
             "force",
             &format!(
-                "{} wanted at the mean height, {}",
+                "{} requested at the mean height, {}",
                 force(lambda * mean_m),
                 mm(mean_m)
             ),
