@@ -131,7 +131,7 @@ impl BlockToeplitz {
                 let given = DMatrix::from_fn(self.columns, 4 * pairs, |channel, column| {
                     let value =
                         spectra[column % pairs * self.columns + channel][both[column / pairs / 2]];
-                    if column / pairs % 2 == 0 {
+                    if (column / pairs).is_multiple_of(2) {
                         value.re
                     } else {
                         value.im
