@@ -222,18 +222,18 @@ impl<'a> ArrayPhysics<'a> {
                 _ => return Ok(None),
             }
         }
-        let single = Single::new(&scene)?;
+        let (inductance_h, core_field_t) = Single::essentials(&scene)?;
         let added = |coil: usize| solved.steel().added_inductance_h(coil, coil);
         let of_array = (0..coils).map(|coil| scene.circuit.inductance_h + added(coil));
         let array_inductance_h = match crate::scene::coupled(design) {
             true => of_array.fold(0.0, f64::max),
-            false => single.inductance_h,
+            false => inductance_h,
         };
         Ok(Some(Physical {
             lambda_n_per_m,
-            inductance_h: single.inductance_h,
+            inductance_h,
             array_inductance_h,
-            core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
+            core_field_t,
         }))
     }
 
