@@ -165,7 +165,10 @@ impl Single {
             }
             Some(_) => {
                 let single = Self::new(scene)?;
-                Ok((single.inductance_h, single.core.map(|core| core.peak_field_t)))
+                Ok((
+                    single.inductance_h,
+                    single.core.map(|core| core.peak_field_t),
+                ))
             }
         }
     }

@@ -210,3 +210,34 @@ fn contradicting_limits_give_the_design_that_breaks_them_least() {
     let (sample, judged) = search.best().expect("a design");
     assert!((judged.excess() - 0.2).abs() < 1e-3, "{sample:?}");
 }
+
+/// The user stops it: what was evaluated is there.
+#[test]
+fn what_was_evaluated_before_an_interruption_is_kept() {
+    struct Stopped(Vec<Variable>, AtomicUsize);
+    impl Problem for Stopped {
+        fn variables(&self) -> &[Variable] {
+            &self.0
+        }
+        fn outputs(&self, x: &[f64]) -> Result<Option<Vec<f64>>, Interrupted> {
+            match self.1.fetch_add(1, Ordering::Relaxed) {
+                0..20 => Ok(Some(vec![x[0] * (0.7 - x[0])])),
+                _ => Err(Interrupted),
+            }
+        }
+        fn judge(&self, _: &[f64], outputs: &[f64]) -> Judged {
+            Judged {
+                objectives: outputs.to_vec(),
+                limits: vec![],
+            }
+        }
+    }
+    let problem = Stopped(
+        vec![variable(0.0, 1.0, Values::Continuous)],
+        AtomicUsize::new(0),
+    );
+    let mut search = Search::new(&problem, Settings::default());
+    assert!(search.run(&[vec![0.9]]).is_err());
+    assert!(search.samples().len() >= 17, "{}", search.samples().len());
+    assert!(search.best().is_some());
+}
