@@ -1,6 +1,8 @@
 //! The search on problems whose optimum is known.
 
+use super::descent::Judged;
 use super::*;
+use fluxform_base::progress::Interrupted;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A problem from closures.

@@ -5,6 +5,7 @@ use clap::Args;
 use super::physics::{ArrayPhysics, Constant, Journal};
 use super::{ArrayEnding, ArrayRequest, optimize_array, tables, text};
 use crate::RunError;
+use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::SurfaceFlags;
 use crate::cli::documents;
@@ -95,7 +96,7 @@ impl ArrayFlags {
             .map_err(|fault| Failure::Documents(vec![fault]))?;
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
-        let mark = super::super::command::mark(shared.design, &document.text);
+        let mark = mark(shared.design, &document.text);
         let overwrite = Overwrite::beginning(shared.force, &mark, &inputs[..1])
             .protecting(document.also_read());
         for file in [shared.out, self.journal.as_ref()].into_iter().flatten() {
@@ -113,7 +114,7 @@ impl ArrayFlags {
             FileArgument::Path(path) => Some(path),
             FileArgument::Standard => None,
         });
-        check_distinct(&paths.collect::<Vec<_>>()).map_err(RunError::from)?;
+        check_distinct(paths.collect::<Vec<_>>()).map_err(RunError::from)?;
         let plot = self.plot.as_ref();
         let plot = plot.map(|file| Picture::new(file, shared.force, document.also_read()));
         if let Some(plot) = &plot {
@@ -326,4 +327,13 @@ fn written_to(
             Ok(Stream::Output)
         }
     }
+}
+
+/// The line by which a design that was made of this one is known from any other file.
+pub(in crate::commands::optimize) fn mark(design: &FileArgument, text: &str) -> String {
+    format!(
+        "# Made of {} (sha256 {}) by `fluxform optimize`.",
+        design.as_given().display(),
+        sha256_hex(text.as_bytes())
+    )
 }
