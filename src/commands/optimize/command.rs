@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::array::command::{ArrayFlags, Shared};
+use super::array::command::{ArrayFlags, Shared, mark};
 use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
 use crate::RunError;
-use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
@@ -223,13 +222,4 @@ impl Optimize {
             }
         }
     }
-}
-
-/// The line by which a design that was made of this one is known from any other file.
-pub(super) fn mark(design: &FileArgument, text: &str) -> String {
-    format!(
-        "# Made of {} (sha256 {}) by `fluxform optimize`.",
-        design.as_given().display(),
-        sha256_hex(text.as_bytes())
-    )
 }
