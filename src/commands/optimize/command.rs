@@ -47,7 +47,7 @@ pub struct Optimize {
     wound: bool,
     /// Among the array's other coils: their unpowered cores count for force and settling of the
     /// coil nearest to the centre, where the design couples them
-    #[arg(long)]
+    #[arg(long, conflicts_with = "shapes")]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
     /// [default: 24; with --for 3]
@@ -57,7 +57,7 @@ pub struct Optimize {
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
-    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',')]
+    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
     fix: Vec<Key>,
     /// Boxes of coils that proving the best may take; 0 for no proof
     #[arg(
@@ -71,7 +71,7 @@ pub struct Optimize {
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
     /// Write a page with the result here (HTML); `-` is standard output
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "shapes")]
     report: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,

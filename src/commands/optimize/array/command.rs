@@ -34,7 +34,7 @@ pub struct ArrayFlags {
     #[arg(long, value_name = "KEY=VALUES", requires = "shapes")]
     pub vary: Vec<String>,
     /// The force constant that is made large
-    #[arg(long, value_name = "NAME", requires = "shapes", default_value = "jnd",
+    #[arg(long, hide_short_help = true, value_name = "NAME", requires = "shapes", default_value = "jnd",
           value_parser = values::named::<Constant>())]
     pub constant: Constant,
     /// Weights of the shapes in the geometric mean of their force constants, in order [default:
@@ -43,7 +43,7 @@ pub struct ArrayFlags {
           num_args = 1.., conflicts_with = "smallest")]
     pub shares: Vec<f64>,
     /// Make the smallest of the shapes' gains large, not their mean
-    #[arg(long, requires = "shapes")]
+    #[arg(long, hide_short_help = true, requires = "shapes")]
     pub smallest: bool,
     /// Most arrays that the search computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
