@@ -17,10 +17,10 @@ use fluxform_numerics::axis::Axis;
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Knee of low-carbon steel that is described by its permeability alone, T.
-const LOW_CARBON_KNEE_T: f64 = 1.5;
+pub(super) const LOW_CARBON_KNEE_T: f64 = 1.5;
 
 /// Relative permeability of the reference design's steel.
-const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
+pub(super) const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -47,10 +47,11 @@ const CONDUCTIVITY_S_PER_M: Rule = Rule::any("S/m")
     .bound(Bound::NotNegative)
     .slips(&[slip(0.0, 1000.0, "MS/m", 1e6)]);
 /// From vacuum to beyond any metal. The slips: mu itself in H/m, and thousands.
-const RELATIVE_PERMEABILITY: Rule = Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
-    slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
-    slip(0.125, 1.0, "thousands", 1000.0),
-]);
+pub(super) const RELATIVE_PERMEABILITY: Rule =
+    Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
+        slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
+        slip(0.125, 1.0, "thousands", 1000.0),
+    ]);
 const AMPERE: Rule = Rule::any("A");
 const BANDWIDTH_HZ: Rule = Rule::any("Hz");
 

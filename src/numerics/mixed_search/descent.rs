@@ -161,7 +161,7 @@ impl Slopes {
         low: &[f64],
         high: &[f64],
     ) -> Self {
-        let mut columns = Vec::with_capacity(free.len());
+        let (mut objectives, mut limits) = (Vec::new(), Vec::new());
         for &i in free {
             let mut at = u.to_vec();
             let ends = [(u[i] - STEP).max(low[i]), (u[i] + STEP).min(high[i])];
@@ -175,21 +175,15 @@ impl Slopes {
                 let finite = |s: f64| if s.is_finite() { s } else { 0.0 };
                 a.iter().zip(b).map(slope).map(finite).collect()
             };
-            columns.push((
-                difference(&below.objectives, &above.objectives),
-                difference(&below.limits, &above.limits),
-            ));
+            objectives.extend(difference(&below.objectives, &above.objectives));
+            limits.extend(difference(&below.limits, &above.limits));
         }
-        let count =
-            |of: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| columns.first().map_or(0, |c| of(c).len());
-        let matrix = |of: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
-            DMatrix::from_fn(count(of), columns.len(), |row, column| {
-                of(&columns[column])[row]
-            })
+        let matrix = |values: Vec<f64>| {
+            DMatrix::from_vec(values.len() / free.len().max(1), free.len(), values)
         };
         Self {
-            objectives: matrix(|c| &c.0),
-            limits: matrix(|c| &c.1),
+            objectives: matrix(objectives),
+            limits: matrix(limits),
         }
     }
 
