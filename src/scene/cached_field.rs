@@ -59,7 +59,7 @@ impl FieldStore {
     pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
-        let store = if design.core.is_some() {
+        let store = if design.core.is_some() || design.has_iron() {
             store
         } else {
             Store::none()
@@ -71,6 +71,7 @@ impl FieldStore {
                 &design.coil,
                 &design.wire,
                 &design.core,
+                (&design.plate, &design.iron),
                 &design.array,
                 &design.magnet,
                 design.workspace.z_m.from,

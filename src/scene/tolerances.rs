@@ -20,6 +20,8 @@ pub const SATURATED_TOLERANCE: f64 = 1e-4;
 pub const CORE_FIELD_TOLERANCE: f64 = 1e-2;
 /// The cores of an array that magnetise each other.
 pub const COUPLED_TOLERANCE: f64 = 1e-4;
+/// Steel of any shape: a plate under nine cores takes half a minute of one processor.
+pub const IRON_TOLERANCE: f64 = 1e-2;
 /// The steel at a working point, relative to the largest |grad B| at a height: the modes that are
 /// taken as linear leave an error of this order.
 pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
@@ -109,7 +111,9 @@ impl Tolerances {
             Some(Material::Curve(_) | Material::Linear(_)) => CORED_TOLERANCE,
         };
         let of_array = |in_air: f64| {
-            if coupled(design) {
+            if design.has_iron() {
+                IRON_TOLERANCE
+            } else if coupled(design) {
                 COUPLED_TOLERANCE
             } else {
                 of_core(in_air)
@@ -129,7 +133,11 @@ impl Tolerances {
             field: or(of_array(KERNEL_ERROR)),
             forces: or(of_array(forces_in_air)),
             map: or(of_array(MAP_TOLERANCE)),
-            inductances: Self::of_inductances(requested),
+            inductances: requested.unwrap_or(if design.has_iron() {
+                IRON_TOLERANCE
+            } else {
+                COUPLED_TOLERANCE
+            }),
             working_point: or(WORKING_POINT_TOLERANCE).max(WORKING_POINT_TOLERANCE),
         }
     }

@@ -259,15 +259,7 @@ impl CoupledArray {
     fn cores(&self, incident: &Incident, currents_a: &[f64]) -> Vec<Core> {
         let count = self.positions_m.len();
         let modes: Vec<DMatrix<f64>> = (0..count)
-            .map(|core| {
-                let mut potential = vec![0.0; self.response.size()];
-                for (drive, current) in self.potentials.iter().zip(currents_a) {
-                    for (sum, value) in potential.iter_mut().zip(&drive[core]) {
-                        *sum += current * value;
-                    }
-                }
-                self.response.modes_of(&potential)
-            })
+            .map(|core| self.modes_at(core, currents_a))
             .collect();
         let sent = incident.layers(&self.response.exchange.to_nodes, &modes);
         modes
