@@ -25,9 +25,10 @@ import tempfile
 
 import numpy as np
 
-from load_bundle import Bundle
-
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "src/python/fluxform"))
+from load_bundle import Bundle  # noqa: E402
+
 SHAPES = ["flat", "half_sphere", "half_cylinder", "wedge"]
 ERRORS = [0.1, 0.03, 0.01, 0.003, 0.001]
 FINEST = 641

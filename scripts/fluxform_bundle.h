@@ -58,7 +58,7 @@ typedef struct fluxform_bundle {
 
 /* How a position was answered. */
 enum {
-    FLUXFORM_OK = 0,        /* the currents give the wanted force */
+    FLUXFORM_OK = 0,        /* the currents give the requested force */
     FLUXFORM_SATURATED = 1, /* their limits allow only the nearest force */
     FLUXFORM_OUTSIDE = 2,   /* outside the map: no currents */
     FLUXFORM_UNABLE = -1    /* no force constant, or a bundle before schema 1.2 */

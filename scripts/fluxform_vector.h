@@ -207,7 +207,7 @@ static double sum_of(const vector_problem *p)
     return sum;
 }
 
-/* Solves the free currents for the wanted force without eps; whether that is optimal. */
+/* Solves the free currents for the requested force without eps; whether that is optimal. */
 static int finish_exactly(vector_problem *p, const double *climbed, int rows)
 {
     double system[4][4], damped[4][4], right[4], y[4], left[4], size, terms = 0;

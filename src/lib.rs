@@ -139,6 +139,7 @@ pub use fluxform_base::digits;
 pub use fluxform_base::force_direction;
 pub use fluxform_base::point_weights;
 pub use fluxform_base::progress;
+pub use fluxform_base::uncertainty;
 pub use fluxform_base::units;
 
 pub use fluxform_numerics as numerics;

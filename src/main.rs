@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    fluxform::commands::main(std::env::args_os())
+    fluxform::commands::main(std::env::args_os()).into()
 }

@@ -9,4 +9,5 @@ pub mod force_constant;
 pub mod force_direction;
 pub mod point_weights;
 pub mod progress;
+pub mod uncertainty;
 pub mod units;

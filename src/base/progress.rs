@@ -106,8 +106,8 @@ pub trait Progress: Sync {
     fn begin(&self, _stage: &str, _total: u64) {}
     /// `items` more work items of the current stage are finished.
     fn advance(&self, _items: u64) {}
-    /// A search has found a better value than any reported before, in its own SI unit.
-    fn improved(&self, _value: f64) {}
+    /// A search has found a better value than any reported before, in this SI unit; `x` is a factor.
+    fn improved(&self, _value: f64, _unit: &'static str) {}
     /// The current stage is finished.
     fn end(&self) {}
     /// True when the user asked to stop: the core returns [`Interrupted`] soon.

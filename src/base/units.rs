@@ -20,6 +20,14 @@ pub const DETECTION_THRESHOLD_N: f64 = 0.8e-3;
 /// Just-noticeable relative difference of finger force (Pang, Tan and Durlach 1991).
 pub const FORCE_JND: f64 = 0.07;
 
+/// Change of the remanence of sintered NdFeB with temperature, 1/K (0.11 to 0.12 % in makers' data sheets,
+/// 20 to 100 C).
+pub const MAGNET_COEFFICIENT_PER_K: f64 = -1.2e-3;
+
+/// Just-noticeable difference between directions of force on a finger, degrees (Barbagli, Salisbury, Ho,
+/// Spence and Tan 2006: 25 to 32 degrees, whatever the direction).
+pub const DIRECTION_JND_DEG: f64 = 25.0;
+
 /// Millimetres to metres. The quotient is correctly rounded: 38 mm is the double nearest 0.038.
 #[must_use]
 pub fn m_from_mm(length_mm: f64) -> f64 {

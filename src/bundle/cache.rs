@@ -138,7 +138,8 @@ impl Store {
         if matches!(dir.status(name), Ok(Some(_))) && !is_entry(&dir, OsStr::new(name)) {
             return;
         }
-        let _ = atomic::put(&dir, name, true, |out| {
+        // Not forced to the disk: an entry that a power cut tears is noticed and computed again.
+        let _ = atomic::put(&dir, name, false, |out| {
             out.write_all(MAGIC)?;
             out.write_all(&origin.digest(&dir))?;
             out.write_all(&Sha256::digest(&bytes))?;

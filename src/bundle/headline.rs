@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr};
 
 use fluxform_base::digits::with_error;
+use fluxform_base::uncertainty::Cause;
 pub use fluxform_lambda::GivenForce;
+use fluxform_lambda::uncertainty::{Shares, Study};
 
 /// A part of the computation that adds an error. Its name in artefacts is the variant's in snake
 /// case, its meaning the first line of the variant's comment.
@@ -101,6 +103,166 @@ pub struct BudgetPart {
     pub how: String,
 }
 
+/// A cause of the felt error. Its name in artefacts is the variant's in snake case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
+#[serde(rename_all = "snake_case")]
+pub enum FeltCause {
+    /// The computation, from the file on: the budget.
+    #[strum(serialize = "computation")]
+    Computation,
+    /// What the coils cannot give within their limits, or no one asked them for.
+    #[strum(serialize = "the currents themselves")]
+    Currents,
+    /// The position.
+    #[strum(serialize = "position sensor")]
+    Sensor,
+    /// The finger's angle.
+    #[strum(serialize = "tilt of the finger")]
+    Tilt,
+    /// The magnet's temperature.
+    #[strum(serialize = "heat of the magnet")]
+    Heat,
+    /// The currents' own errors.
+    #[strum(serialize = "drivers")]
+    Driver,
+}
+
+impl FeltCause {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        self.into()
+    }
+}
+
+impl From<Cause> for FeltCause {
+    fn from(cause: Cause) -> Self {
+        match cause {
+            Cause::Sensor => Self::Sensor,
+            Cause::Tilt => Self::Tilt,
+            Cause::Heat => Self::Heat,
+            Cause::Driver => Self::Driver,
+        }
+    }
+}
+
+/// Errors of the force vector relative to the requested one, with each kind of currents.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeltShares {
+    /// With the static currents.
+    #[serde(rename = "static")]
+    pub fixed: f64,
+    /// With position feedback, currents of least power.
+    pub feedback: f64,
+    /// With position feedback, currents chosen for the uncertainties; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robust: Option<f64>,
+}
+
+impl From<Shares> for FeltShares {
+    fn from(of: Shares) -> Self {
+        Self {
+            fixed: of.fixed,
+            feedback: of.feedback,
+            robust: Some(of.robust),
+        }
+    }
+}
+
+impl FeltShares {
+    fn plus(self, more: f64) -> Self {
+        Self {
+            fixed: self.fixed + more,
+            feedback: self.feedback + more,
+            robust: self.robust.map(|of| of + more),
+        }
+    }
+}
+
+/// A part of the felt error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeltPart {
+    /// Its cause.
+    pub cause: FeltCause,
+    /// The error with this cause alone; of uncertainties what they add to that of the currents.
+    pub error: FeltShares,
+}
+
+/// The error of the force vector from the file to the finger.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeltForce {
+    /// All of it: `expected` plus the most that the computation may add.
+    pub total: FeltShares,
+    /// Root mean square over the points and the uncertainties, relative to that of the requested force.
+    pub expected: FeltShares,
+    /// The same split: the computation adds up with the others, whose squares do.
+    pub parts: Vec<FeltPart>,
+    /// What is in none of them.
+    pub not_modelled: Vec<String>,
+}
+
+/// What no part of the felt error stands for.
+const NOT_MODELLED: [&str; 6] = [
+    "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",
+    "the coils' heat: it decides power and limits, not the force of a given current",
+    "manufacture: places and turns of the coils, gaps, permeability (`probe --scan` measures them)",
+    "the steel's hysteresis and eddy currents",
+    "the finger: its compliance, and where on it the magnet sits",
+    "the magnet's body under tilt: its moment turns, its ends do not move",
+];
+
+impl FeltForce {
+    /// Of currents whose errors without any uncertainty are given, and with those of `study`.
+    #[must_use]
+    pub fn new(exact: FeltShares, study: Option<&Study>) -> Self {
+        let promised = |study: &Study| FeltShares {
+            fixed: study.fixed.promised.expected,
+            feedback: study.feedback.promised.expected,
+            robust: Some(study.robust.error.promised.expected),
+        };
+        let causes = study.map_or(&[][..], |study| &study.causes);
+        let own = FeltPart {
+            cause: FeltCause::Currents,
+            error: study.map_or(exact, |study| study.exact.into()),
+        };
+        let parts = causes.iter().map(|of| FeltPart {
+            cause: of.cause.into(),
+            error: of.alone.into(),
+        });
+        let missing = Cause::ALL
+            .iter()
+            .filter(|cause| causes.iter().all(|of| of.cause != **cause));
+        let not_given =
+            missing.map(|cause| format!("{}: no bound is given ([uncertainty])", cause.words()));
+        let expected = study.map_or(exact, promised);
+        Self {
+            total: expected,
+            expected,
+            parts: std::iter::once(own).chain(parts).collect(),
+            not_modelled: not_given.chain(NOT_MODELLED.map(str::to_owned)).collect(),
+        }
+    }
+
+    /// Counts the most that the computation may add.
+    fn count(&mut self, computation: f64) {
+        self.total = self.expected.plus(computation);
+        self.parts
+            .retain(|part| part.cause != FeltCause::Computation);
+        let nothing = FeltShares {
+            fixed: 0.0,
+            feedback: 0.0,
+            robust: self.expected.robust.map(|_| 0.0),
+        };
+        self.parts.insert(
+            0,
+            FeltPart {
+                cause: FeltCause::Computation,
+                error: nothing.plus(computation),
+            },
+        );
+    }
+}
+
 /// What a result comes to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Headline {
@@ -125,6 +287,9 @@ pub struct Headline {
     /// rendered force goes from one side's to the other's within a cell, whatever the grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jumps: Option<f64>,
+    /// The error of the force vector at the finger; absent in files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub felt: Option<FeltForce>,
     /// What `--error` came to; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requested: Option<RequestedError>,
@@ -182,6 +347,7 @@ impl Headline {
             budget: Vec::new(),
             to_halve: None,
             jumps: None,
+            felt: None,
             requested: None,
         };
         headline.add(budget);
@@ -197,11 +363,20 @@ impl Headline {
             parts.map(|part| part.error).sum()
         };
         self.force_error = sum(&|_| true);
+        if let Some(felt) = &mut self.felt {
+            felt.count(self.force_error);
+        }
         self.lambda_error_n_per_m = self.lambda_n_per_m * sum(&|part| part.part.is_of_lambda());
         let lambda = with_error(self.lambda_n_per_m, self.lambda_error_n_per_m);
         self.lambda = format!("{lambda} N/m");
         let largest = self.budget.first().filter(|part| part.error > 0.0);
         self.to_halve = largest.map(|part| part.part.to_halve().to_owned());
+    }
+
+    /// Adds what the finger feels of it.
+    pub fn add_felt(&mut self, mut felt: FeltForce) {
+        felt.count(self.force_error);
+        self.felt = Some(felt);
     }
 
     /// The error of one part.

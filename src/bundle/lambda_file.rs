@@ -12,7 +12,10 @@ use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
+pub use fluxform_lambda::two_fingers::TwoFingers;
+pub use fluxform_lambda::uncertainty::{CurrentsError, RobustSetting, Study, TradeOff};
 use fluxform_lambda::vector_feedback::VectorRendering;
+pub use fluxform_lambda::vector_static::{VectorCurrents, VectorStatic};
 use fluxform_lambda::worst::ActivePoint;
 use fluxform_lambda::{Criterion, ForceConstants, GivenForce, Wiring};
 
@@ -94,6 +97,9 @@ pub struct LambdaFile {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sideways: Option<Sideways>,
+    /// The felt error under the uncertainties given; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Study>,
     /// What the result comes to; absent without a lambda and in files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub headline: Option<Headline>,
@@ -123,7 +129,7 @@ pub struct SampledPoints {
 }
 
 /// Rendering with position feedback: at every point the currents of least power that give the
-/// wanted force there. A pair in series counts as one coil.
+/// requested force there. A pair in series counts as one coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FeedbackFile {
     /// The largest that every point can be given, N/m; null where there is none above zero.
@@ -144,6 +150,9 @@ pub struct FeedbackFile {
     /// The same demand above and below the surface; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shell: Option<FeedbackShell>,
+    /// Two fingers on the array at the chosen lambda; absent when not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub two_fingers: Option<TwoFingers>,
     /// The force vector; absent where the upward force alone is requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vector: Option<VectorFeedbackFile>,
@@ -166,6 +175,9 @@ pub struct VectorFeedbackFile {
     /// The static currents at the chosen lambda; null without one, as the next two.
     #[serde(rename = "static")]
     pub fixed: Option<VectorRendering>,
+    /// Static currents chosen for all three components; absent in files of programs without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub static_vector: Option<VectorStatic>,
     /// Feedback of the upward part alone, at the chosen lambda.
     pub upward: Option<VectorRendering>,
     /// Feedback of all three components, at the chosen lambda.
@@ -231,7 +243,7 @@ pub struct FeedbackShell {
 pub struct TolerancePoint {
     /// N/m; null where no force is wanted, where any is tolerated, or where none can be kept.
     pub lambda_n_per_m: Option<f64>,
-    /// The part of the wanted force that is not felt: `jnd`.
+    /// The part of the requested force that is not felt: `jnd`.
     pub share: f64,
     /// The force that is not felt at all, N.
     pub threshold_n: f64,
@@ -326,7 +338,7 @@ pub struct WorstPointFile {
     /// Where the first limit binds, N/m.
     pub lambda_linear_n_per_m: Option<f64>,
     /// The largest lambda at which limits add less than a just-noticeable difference of the
-    /// largest wanted force to t*, N/m.
+    /// largest requested force to t*, N/m.
     pub lambda_jnd_n_per_m: Option<f64>,
     /// t* over lambda times the largest height, as long as no limit binds.
     pub relative_floor: Option<f64>,

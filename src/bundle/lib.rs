@@ -2,7 +2,7 @@
 //! numbers were made.
 //!
 //! [`load::Bundle`] is how a Rust program reads a bundle that `calibrate` wrote;
-//! `scripts/load_bundle.py`, `scripts/load_bundle.m` and `scripts/fluxform_bundle.h` are its
+//! `src/python/fluxform/load_bundle.py`, `scripts/load_bundle.m` and `scripts/fluxform_bundle.h` are its
 //! sisters for Python, Octave or MATLAB, and C. The crate's first page has an example. A bundle
 //! is not trusted: a folder that is none, another schema or a changed byte is an error.
 //!

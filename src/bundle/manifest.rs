@@ -11,6 +11,7 @@ use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::Criterion;
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
+use fluxform_base::uncertainty::UncertaintyOverride;
 use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
@@ -83,6 +84,9 @@ pub struct MadeWith {
     /// `--normal-force`; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_force: Option<NormalForce>,
+    /// `--sensor-error`, `--tilt`, `--heat`, `--driver-error`, `--power-cap`; absent without any.
+    #[serde(default, skip_serializing_if = "UncertaintyOverride::is_none")]
+    pub uncertainty: UncertaintyOverride,
     /// `--error`, relative; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,

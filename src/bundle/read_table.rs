@@ -90,9 +90,9 @@ impl<'a> Line<'a> {
 pub fn read_columns(
     name: &str,
     source: impl Read,
-    wanted: &[&str],
+    expected: &[&str],
 ) -> Result<Vec<Vec<f64>>, TableError> {
-    read_numbered(name, source, wanted).map(|(columns, _)| columns)
+    read_numbered(name, source, expected).map(|(columns, _)| columns)
 }
 
 /// As [`read_columns`], with the line of every row, for messages about what the numbers mean.
@@ -102,10 +102,10 @@ pub fn read_columns(
 pub(crate) fn read_numbered(
     name: &str,
     source: impl Read,
-    wanted: &[&str],
+    expected: &[&str],
 ) -> Result<(Vec<Vec<f64>>, Vec<u64>), TableError> {
     let text = whole(name, source)?;
-    let separator = separated_by_commas(name, &text, wanted);
+    let separator = separated_by_commas(name, &text, expected);
     separator.map_or(Ok(()), |fault| Err(TableError::one(fault)))?;
     let mut reader = ReaderBuilder::new()
         .trim(Trim::All)
@@ -117,8 +117,8 @@ pub(crate) fn read_numbered(
         .iter()
         .map(|cell| String::from_utf8_lossy(cell).into_owned())
         .collect();
-    let places = find_columns(name, &header, wanted)?;
-    let mut columns = vec![Vec::new(); wanted.len()];
+    let places = find_columns(name, &header, expected)?;
+    let mut columns = vec![Vec::new(); expected.len()];
     let mut lines = Vec::new();
     let mut faults = Vec::new();
     let mut more = 0usize;
@@ -146,12 +146,12 @@ pub(crate) fn read_numbered(
             continue;
         }
         lines.push(line);
-        for ((column, &place), wanted) in columns.iter_mut().zip(&places).zip(wanted) {
+        for ((column, &place), expected) in columns.iter_mut().zip(&places).zip(expected) {
             let cell = std::str::from_utf8(&record[place]).unwrap_or("(not UTF-8)");
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => column.push(value),
                 _ => {
-                    fault(not_a_number(wanted, cell));
+                    fault(not_a_number(expected, cell));
                 }
             }
         }
@@ -189,12 +189,12 @@ fn not_a_number(column: &str, cell: &str) -> String {
 
 /// What is wrong with a table that is empty, or whose first line has the expected columns and another
 /// separator than commas.
-fn separated_by_commas(name: &str, text: &[u8], wanted: &[&str]) -> Option<String> {
+fn separated_by_commas(name: &str, text: &[u8], expected: &[&str]) -> Option<String> {
     let first = text
         .split(|byte| matches!(byte, b'\n' | b'\r'))
         .find(|line| !line.is_empty());
     let Some(first) = first else {
-        let columns = wanted.join(",");
+        let columns = expected.join(",");
         return Some(format!(
             "{name}: the table is empty; expected a header line with {columns}"
         ));
@@ -204,7 +204,7 @@ fn separated_by_commas(name: &str, text: &[u8], wanted: &[&str]) -> Option<Strin
         .into_iter()
         .find(|(separator, _)| {
             let cells: Vec<&str> = line.split(*separator).map(str::trim).collect();
-            cells.len() > 1 && wanted.iter().any(|column| cells.contains(column))
+            cells.len() > 1 && expected.iter().any(|column| cells.contains(column))
         });
     other.map(|(_, separators)| {
         format!(
@@ -214,10 +214,14 @@ fn separated_by_commas(name: &str, text: &[u8], wanted: &[&str]) -> Option<Strin
     })
 }
 
-fn find_columns(name: &str, header: &[String], wanted: &[&str]) -> Result<Vec<usize>, TableError> {
+fn find_columns(
+    name: &str,
+    header: &[String],
+    expected: &[&str],
+) -> Result<Vec<usize>, TableError> {
     let mut places = Vec::new();
     let mut faults = Vec::new();
-    for column in wanted {
+    for column in expected {
         let mut found = header.iter().enumerate().filter(|(_, cell)| cell == column);
         match (found.next(), found.next()) {
             (Some((place, _)), None) => places.push(place),
@@ -226,7 +230,7 @@ fn find_columns(name: &str, header: &[String], wanted: &[&str]) -> Result<Vec<us
                 let shown: String = header.join(",").chars().take(120).collect();
                 faults.push(format!(
                     "{name}:1: column {column} is missing; expected a header line with {}, found {shown:?}",
-                    wanted.join(",")
+                    expected.join(",")
                 ));
             }
         }

@@ -65,7 +65,7 @@ impl ReplayRows {
         self.t_s.is_empty()
     }
 
-    /// Wanted force minus the given one at a position (eq. 7), N.
+    /// Requested force minus the given one at a position (eq. 7), N.
     #[must_use]
     pub fn error_n(&self, row: usize) -> f64 {
         self.wanted_force_n[row] - self.force_n[row]

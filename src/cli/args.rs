@@ -11,6 +11,7 @@ use crate::scene::sources::Sampling;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::Up;
 use crate::shape::step::STEP_SECONDS;
+use crate::uncertainty::UncertaintyOverride;
 
 /// Options of every command.
 #[derive(Debug, Clone, Args)]
@@ -202,6 +203,40 @@ impl From<ForceFlags> for ForceOverride {
         Self {
             direction: flags.force_direction,
             normal_force: flags.normal_force,
+        }
+    }
+}
+
+/// What is uncertain of the display in use, in place of what its design states.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct UncertaintyFlags {
+    /// How far the magnet may be from where it is measured, along each axis, like 4mm [default: the
+    /// design's `[uncertainty]`, as the next three]
+    #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::sensor_error, allow_hyphen_values = true)]
+    sensor_error: Option<f64>,
+    /// How far the finger may tilt the magnet, like 10deg
+    #[arg(long, hide_short_help = true, value_name = "ANGLE", value_parser = values::tilt, allow_hyphen_values = true)]
+    tilt: Option<f64>,
+    /// How much warmer the magnet may become, like 20C
+    #[arg(long, hide_short_help = true, value_name = "DEGREES", value_parser = values::heat, allow_hyphen_values = true)]
+    heat: Option<f64>,
+    /// By how much each driver's current may be off, like 2%
+    #[arg(long, hide_short_help = true, value_name = "PART", value_parser = values::driver_error, allow_hyphen_values = true)]
+    driver_error: Option<f64>,
+    /// Mean power that currents chosen for the uncertainties may take, in watts [default: the least with
+    /// which the error is within 5 % of the least]
+    #[arg(long, hide_short_help = true, value_name = "WATTS", value_parser = values::power, allow_hyphen_values = true)]
+    power_cap: Option<f64>,
+}
+
+impl From<UncertaintyFlags> for UncertaintyOverride {
+    fn from(flags: UncertaintyFlags) -> Self {
+        Self {
+            sensor_m: flags.sensor_error,
+            tilt_deg: flags.tilt,
+            heat_c: flags.heat,
+            driver: flags.driver_error,
+            power_cap_w: flags.power_cap,
         }
     }
 }

@@ -1,13 +1,13 @@
 //! The progress bar, and the seconds of every stage: the only clock of a job.
 #![allow(clippy::disallowed_methods)] // a bar needs a clock
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::quantity::force;
+use super::quantity::{force, si};
 use crate::progress::{Progress, stop_requested};
 
 /// Stages that end sooner are never drawn.
@@ -20,6 +20,27 @@ const REFRESH: Duration = Duration::from_millis(100);
 pub struct Bar {
     shared: Arc<Shared>,
     painter: Option<JoinHandle<()>>,
+}
+
+/// Shows another thread how far the running job is.
+#[derive(Debug, Clone, Default)]
+pub struct Watch(Arc<Mutex<Weak<Shared>>>);
+
+impl Watch {
+    /// Looks at the job of `bar` from now on.
+    pub fn follow(&self, bar: &Bar) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(&bar.shared);
+    }
+
+    /// The innermost stage, how many of its items are done, and how many there are.
+    #[must_use]
+    pub fn stage(&self) -> Option<(String, u64, u64)> {
+        let job = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared = job.upgrade()?;
+        let state = shared.lock();
+        let stage = state.stages.last()?;
+        Some((stage.name.clone(), stage.done, stage.total))
+    }
 }
 
 #[derive(Debug, Default)]
@@ -36,8 +57,8 @@ struct State {
     seconds: Vec<(String, f64)>,
     drawn: Option<ProgressBar>,
     finished: bool,
-    /// The best force that a search has found, N.
-    best_n: Option<f64>,
+    /// The best value that a search has found.
+    best: Option<String>,
 }
 
 #[derive(Debug)]
@@ -75,9 +96,7 @@ impl Drop for Bar {
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
         // Nothing under the lock leaves the state half changed.
-        self.state
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn paint(&self) {
@@ -102,8 +121,8 @@ impl State {
         let message = if stop_requested() {
             format!("{name} (stopping)")
         } else {
-            match self.best_n {
-                Some(best_n) => format!("{name} {}", force(best_n)),
+            match &self.best {
+                Some(best) => format!("{name} {best}"),
                 None => name.clone(),
             }
         };
@@ -183,8 +202,13 @@ impl Progress for Bar {
         }
     }
 
-    fn improved(&self, value: f64) {
-        self.shared.lock().best_n = Some(value);
+    fn improved(&self, value: f64, unit: &'static str) {
+        let shown = match unit {
+            "x" => format!("x {value:.4}"),
+            "N" => force(value),
+            unit => si(value, unit),
+        };
+        self.shared.lock().best = Some(shown);
     }
 
     fn end(&self) {

@@ -2,12 +2,14 @@
 
 use super::quantity::{count, error, length_error, mm, number, number_to, percent};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::headline::{BudgetPart, Headline};
+use crate::bundle::headline::{BudgetPart, FeltForce, FeltPart, Headline};
 use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
 use crate::lambda::GivenForce;
+use crate::lambda::uncertainty::{CurrentsError, Study};
+use crate::uncertainty::Cause;
 
 /// Coils beyond this many are summed up, not listed.
 const COILS_SHOWN: usize = 100;
@@ -188,6 +190,78 @@ pub fn force_error(headline: &Headline) -> String {
     lines.join("\n")
 }
 
+/// The felt error of the force vector with each kind of currents.
+pub fn felt(felt: &FeltForce) -> String {
+    let of = felt.total;
+    let robust = of.robust.map_or_else(String::new, |of| {
+        format!(", {} with currents chosen for the uncertainties", share(of))
+    });
+    format!(
+        "force vector off by {} with static currents, {} with feedback{robust}",
+        share(of.fixed),
+        share(of.feedback)
+    )
+}
+
+/// The same split by cause, in the same order, and what is in none of its parts.
+pub fn felt_parts(felt: &FeltForce) -> String {
+    let one = |part: &FeltPart| {
+        let of = part.error;
+        let shares = [Some(of.fixed), Some(of.feedback), of.robust];
+        let shares: Vec<String> = shares.into_iter().flatten().map(share).collect();
+        format!("{} {}", part.cause.words(), shares.join(", "))
+    };
+    let parts: Vec<String> = felt.parts.iter().map(one).collect();
+    format!(
+        "{}\nnot modelled: {}",
+        parts.join("; "),
+        felt.not_modelled.join("; ")
+    )
+}
+
+/// What uncertainties cost, which to halve first, and the setting chosen for them.
+pub fn uncertainty(of: &Study) -> String {
+    let one = |name: &str, error: &CurrentsError| {
+        let (promised, realised) = (&error.promised, &error.realised);
+        format!(
+            "{name}: upward {}, sideways {}, worst {}; {} W; of {} random displays {} and {}",
+            share(promised.vertical),
+            share(promised.sideways),
+            share(promised.worst),
+            number_to(promised.mean_power_w, 3),
+            of.draws,
+            share(realised.vertical),
+            share(realised.sideways),
+        )
+    };
+    let mut lines = vec![
+        one("static currents", &of.fixed),
+        one("static, chosen for them", &of.robust_static.error),
+        one("feedback", &of.feedback),
+        one("feedback, chosen for them", &of.robust.error),
+    ];
+    lines.extend(of.causes.iter().map(|cost| {
+        format!(
+            "{} {}: half of it takes {} off feedback, {} off currents chosen for it",
+            cost.cause.words(),
+            bound(cost.cause, cost.bound),
+            share(cost.halving_gains.feedback),
+            share(cost.halving_gains.robust),
+        )
+    }));
+    lines.join("\n")
+}
+
+/// The bound of an uncertainty in its unit.
+fn bound(cause: Cause, value: f64) -> String {
+    match cause {
+        Cause::Sensor => mm(value),
+        Cause::Tilt => format!("{} degrees", number(value)),
+        Cause::Heat => format!("{} C", number(value)),
+        Cause::Driver => percent(value),
+    }
+}
+
 /// What a requested error came to; `None` where none was requested.
 pub fn requested_error(headline: &Headline) -> Option<String> {
     let requested = headline.requested.as_ref()?;
@@ -221,7 +295,7 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
 
 /// An error's share of a whole, in two digits.
 fn share(part: f64) -> String {
-    if part < 1e-5 {
+    if part > 0.0 && part < 1e-5 {
         return error(part);
     }
     format!("{} %", number_to(part * 100.0, 2))

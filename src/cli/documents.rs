@@ -1,5 +1,6 @@
 //! From the files on the command line to validated documents; every fault in one run.
 
+use std::cell::RefCell;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -97,7 +98,7 @@ impl FileKind {
         if SurfaceFormat::of(path).is_some() {
             return Self::Shape;
         }
-        let text = source::text_of(path).ok();
+        let text = text_of(file).ok();
         let Some(table) = text.and_then(|text| text.parse::<toml::Table>().ok()) else {
             return Self::Unknown;
         };
@@ -277,10 +278,26 @@ pub fn one_standard_input<'a>(
     Ok(())
 }
 
+thread_local! {
+    /// Documents in memory, with their names.
+    static GIVEN: RefCell<Vec<(PathBuf, String)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// From now on this thread reads `documents` in place of the files of their names.
+pub fn give(documents: Vec<(PathBuf, String)>) {
+    GIVEN.replace(documents);
+}
+
 fn text_of(file: &FileArgument) -> Result<String, InvalidDocument> {
     match file {
         FileArgument::Standard => source::text_from(io::stdin().lock(), Path::new("-")),
-        FileArgument::Path(path) => source::text_of(path),
+        FileArgument::Path(path) => {
+            let given = GIVEN.with_borrow(|given| {
+                let named = given.iter().find(|(name, _)| name == path);
+                named.map(|(_, text)| text.clone())
+            });
+            given.map_or_else(|| source::text_of(path), Ok)
+        }
     }
 }
 

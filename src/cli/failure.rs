@@ -139,6 +139,72 @@ impl Failure {
     }
 }
 
+/// A failure as `--format json` states it.
+#[derive(Debug, Serialize)]
+pub struct ErrorObject {
+    error: ErrorFacts,
+}
+
+#[derive(Debug, Serialize)]
+struct ErrorFacts {
+    /// Stable name of the kind of failure.
+    code: &'static str,
+    /// The process's exit code.
+    exit_code: u8,
+    /// The code's meaning.
+    meaning: &'static str,
+    /// The message, one line per fault.
+    message: String,
+    faults: Vec<FaultEntry>,
+    warnings: Vec<String>,
+    /// The summary that would have gone to standard error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    summary: Option<serde_json::Value>,
+}
+
+impl ErrorObject {
+    fn new(code: Code, message: String) -> Self {
+        let error = ErrorFacts {
+            code: code.name(),
+            exit_code: code.exit_code(),
+            meaning: code.meaning(),
+            message,
+            faults: Vec::new(),
+            warnings: Vec::new(),
+            summary: None,
+        };
+        Self { error }
+    }
+
+    /// A failure of the kind `code`, the warnings before it, and the JSON of a summary that is due.
+    #[must_use]
+    pub fn of(
+        failure: &Failure,
+        code: Code,
+        warnings: Vec<String>,
+        summary: Option<Vec<u8>>,
+    ) -> Self {
+        let mut object = Self::new(code, failure.message());
+        object.error.faults = failure.faults();
+        object.error.warnings = warnings;
+        object.error.summary = summary.and_then(|text| serde_json::from_slice(&text).ok());
+        object
+    }
+
+    /// An internal error.
+    #[must_use]
+    pub fn internal(message: &str) -> Self {
+        Self::new(Code::Internal, message.to_owned())
+    }
+
+    /// The object, on one line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        // Plain texts and whole numbers can always be written.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
 /// Bundles that are named where a folder above them was given.
 const BUNDLES_NAMED: usize = 8;
 

@@ -12,8 +12,9 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use serde::Serialize;
 
 use super::args::{Colour, Common, Format};
+use super::bar::{Bar, Watch};
 use super::code::Code;
-use super::failure::{Failure, FaultEntry};
+use super::failure::{ErrorObject, Failure};
 use super::terminal;
 use crate::bundle::json::to_json;
 use crate::design::Faults;
@@ -36,6 +37,19 @@ pub struct Printer {
     assumed: RefCell<Option<Vec<AssumedEntry>>>,
     /// A summary as JSON that is due on standard error.
     pending: RefCell<Option<Vec<u8>>>,
+    /// Inside another program: results in place of output, and who watches the job.
+    captured: Option<(RefCell<Captured>, Watch)>,
+}
+
+/// The output of a command that runs inside another program.
+#[derive(Debug, Default)]
+pub struct Captured {
+    /// The result as JSON.
+    pub json: Vec<u8>,
+    /// The summary for people.
+    pub text: String,
+    /// Data for standard output: a table, help.
+    pub data: Vec<u8>,
 }
 
 /// Where a summary goes.
@@ -65,49 +79,6 @@ struct AssumedEntry {
     value: Option<toml::Value>,
 }
 
-#[derive(Serialize)]
-struct ErrorObject {
-    error: ErrorFacts,
-}
-
-#[derive(Serialize)]
-struct ErrorFacts {
-    /// Stable name of the kind of failure.
-    code: &'static str,
-    /// The process's exit code.
-    exit_code: u8,
-    /// The code's meaning.
-    meaning: &'static str,
-    /// The message, one line per fault.
-    message: String,
-    faults: Vec<FaultEntry>,
-    warnings: Vec<String>,
-    /// The summary that would have gone to standard error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    summary: Option<serde_json::Value>,
-}
-
-impl ErrorFacts {
-    /// The advice for every failure of that kind.
-    fn of(code: Code) -> Self {
-        Self {
-            code: code.name(),
-            exit_code: code.exit_code(),
-            meaning: code.meaning(),
-            message: String::new(),
-            faults: Vec::new(),
-            warnings: Vec::new(),
-            summary: None,
-        }
-    }
-
-    /// The object, on one line.
-    fn line(self) -> String {
-        // Plain texts and whole numbers can always be written.
-        serde_json::to_string(&ErrorObject { error: self }).unwrap_or_default()
-    }
-}
-
 impl Printer {
     /// A printer that does as the arguments say.
     #[must_use]
@@ -129,6 +100,38 @@ impl Printer {
             warnings: RefCell::default(),
             assumed: RefCell::default(),
             pending: RefCell::default(),
+            captured: None,
+        }
+    }
+
+    /// A printer that prints nothing: results are returned, as JSON and as text, and `watch` sees how far
+    /// the job is.
+    #[must_use]
+    pub fn capturing(common: &Common, watch: Watch) -> Self {
+        let common = Common {
+            format: Format::Json,
+            quiet: true,
+            color: Colour::Never,
+            ..common.clone()
+        };
+        Self {
+            captured: Some((RefCell::default(), watch)),
+            ..Self::new(&common)
+        }
+    }
+
+    /// What was printed, where that is captured.
+    #[must_use]
+    pub fn captured(self) -> Captured {
+        self.captured
+            .map(|(captured, _)| captured.into_inner())
+            .unwrap_or_default()
+    }
+
+    /// Shows the job that begins to whoever watches.
+    pub fn begins(&self, bar: &Bar) {
+        if let Some((_, watch)) = &self.captured {
+            watch.follow(bar);
         }
     }
 
@@ -235,6 +238,12 @@ impl Printer {
         json: &impl Serialize,
         human: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
+        if let Some((captured, _)) = &self.captured {
+            let mut captured = captured.borrow_mut();
+            captured.json = to_json(json)?;
+            captured.text = visible(&human()).into_owned();
+            return Ok(());
+        }
         let text = match self.format {
             Format::Json => to_json(json)?,
             Format::Human if self.quiet => return Ok(()),
@@ -275,6 +284,10 @@ impl Printer {
         &self,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
+        if let Some((captured, _)) = &self.captured {
+            write(&mut captured.borrow_mut().data)?;
+            return Ok(());
+        }
         let mut out = BufWriter::with_capacity(BUFFER_BYTES, io::stdout().lock());
         write(&mut out)?;
         out.flush()?;
@@ -288,14 +301,7 @@ impl Printer {
         };
         if self.json() {
             let summary = self.pending.take();
-            let error = ErrorFacts {
-                message: failure.message(),
-                faults: failure.faults(),
-                warnings: self.warnings.take(),
-                summary: summary.and_then(|text| serde_json::from_slice(&text).ok()),
-                ..ErrorFacts::of(code)
-            };
-            say(&error.line());
+            say(&ErrorObject::of(failure, code, self.warnings.take(), summary).line());
         } else if let Failure::Documents(documents) = failure {
             for document in documents {
                 say(&document.faults.render(self.colour, width()));
@@ -313,11 +319,7 @@ impl Printer {
     /// Reports an internal error.
     pub fn mistake(&self, message: &str) {
         if self.json() {
-            let error = ErrorFacts {
-                message: message.to_owned(),
-                ..ErrorFacts::of(Code::Internal)
-            };
-            say(&error.line());
+            say(&ErrorObject::internal(message).line());
         } else {
             self.report(Code::Internal, message);
         }

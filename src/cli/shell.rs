@@ -2,22 +2,22 @@
 //! codes, the progress bar, interruption.
 
 use std::ffi::OsString;
-use std::process::ExitCode;
+use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{ArgMatches, ColorChoice, CommandFactory, FromArgMatches};
 
 pub use super::args::{Colour, Common, Format, Writing};
-pub use super::bar::Bar;
+pub use super::bar::{Bar, Watch};
 pub use super::exit::Exit;
 pub use super::failure::Failure;
 pub use super::help::{Codes, page};
 pub use super::layout::{Sheet, Side, table};
-pub use super::printer::{Printer, Stream};
+pub use super::printer::{Captured, Printer, Stream};
 pub use super::quantity::{bytes, count, error, number_to, si};
 pub use super::start::{begin, folder};
 pub use super::values::FileArgument;
-use super::{budget, interrupt};
+use super::{budget, documents, interrupt};
 use crate::RunError;
 use crate::progress::interruptible;
 use crate::shape::step::{self, Kernel, STEP_SECONDS};
@@ -42,8 +42,8 @@ pub trait Program: CommandFactory + FromArgMatches {
     fn run(&self, printer: &Printer) -> Result<(), Failure>;
 }
 
-/// Runs a program and returns the process's exit code.
-pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
+/// Runs a program and returns how the process ends.
+pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> Exit {
     let args = help_as_option(args.collect());
     let early = common_before_parsing(&args);
     std::panic::set_hook(Box::new(move |panic| {
@@ -55,7 +55,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
         .and_then(|matches| P::parse(&matches));
     let program = match parsed {
         Ok(program) => program,
-        Err(error) => return not_parsed(&error, &args).into(),
+        Err(error) => return not_parsed(&error, &args),
     };
     let printer = Printer::new(program.common());
     interrupt::listen(program.common());
@@ -65,13 +65,64 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     match ran {
         Ok(()) => {
             printer.finish();
-            Exit::Done.into()
+            Exit::Done
         }
         Err(failure) => {
             printer.failure(&failure);
-            failure.exit().into()
+            failure.exit()
         }
     }
+}
+
+/// Runs a program inside another one, which has the signals, the screen and the threads: nothing is
+/// printed. `given` are documents that are in memory, read in place of the files of their names.
+pub fn captured<P: Program + Send>(
+    args: &[OsString],
+    given: Vec<(PathBuf, String)>,
+    watch: Watch,
+) -> (Captured, Result<(), Failure>) {
+    let parsed = P::command()
+        .try_get_matches_from(args)
+        .and_then(|matches| P::parse(&matches));
+    let program = match parsed {
+        Ok(program) => program,
+        Err(error) if error.use_stderr() => {
+            let message = error.render().to_string();
+            let message = message.trim().trim_start_matches("error: ").to_owned();
+            return (Captured::default(), Err(Failure::Usage(message)));
+        }
+        Err(help) => {
+            let captured = Captured {
+                text: help.render().to_string(),
+                ..Captured::default()
+            };
+            return (captured, Ok(()));
+        }
+    };
+    let common = program.common().clone();
+    configure(&common);
+    let threads = common.threads.map(pool).transpose();
+    let run = move || {
+        documents::give(given);
+        let printer = Printer::capturing(&common, watch);
+        let ran = interruptible(|| program.run(&printer))
+            .unwrap_or_else(|stop| Err(RunError::from(stop).into()));
+        documents::give(Vec::new());
+        (printer.captured(), ran)
+    };
+    match threads {
+        Ok(None) => run(),
+        Ok(Some(pool)) => pool.install(run),
+        Err(failure) => (Captured::default(), Err(failure)),
+    }
+}
+
+/// As many threads as requested.
+fn pool(threads: usize) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))
 }
 
 /// `help COMMAND` as `COMMAND --help`.
@@ -91,13 +142,18 @@ fn prepare(common: &Common) -> Result<(), Failure> {
             .build_global()
             .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
     }
+    configure(common);
+    Ok(())
+}
+
+/// Memory and the process that reads STEP.
+fn configure(common: &Common) {
     budget::grant(common.memory);
     step::configure(Kernel {
         python: common.python.clone(),
         cpu_seconds: common.step_seconds,
         ..Kernel::default()
     });
-    Ok(())
 }
 
 /// Common options, as far as they are known before the arguments are parsed.

@@ -11,7 +11,9 @@ use super::values::FileArgument;
 /// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
 pub fn begin(printer: &Printer) -> Bar {
     interrupt::working();
-    Bar::new(printer.draws())
+    let bar = Bar::new(printer.draws());
+    printer.begins(&bar);
+    bar
 }
 
 /// The folder that `file` names.

@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::choice::Choice;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{parse_unit, unit_names};
+use crate::uncertainty::Uncertainty;
 use crate::units::m_from_mm;
 
 /// Any variant of `T` by its name; the help states what it means.
@@ -191,6 +192,16 @@ pub fn ends(text: &str) -> Result<Ends, String> {
     }
 }
 
+/// Two distances of fingers, m, the smaller one first and above 0.
+pub fn distances(text: &str) -> Result<Ends, String> {
+    match ends(text)? {
+        Ends([from, _]) if from <= 0.0 => {
+            Err("two fingers cannot be in the same place: write distances above 0".to_owned())
+        }
+        ends => Ok(ends),
+    }
+}
+
 /// `NxM`: samples along x and y.
 pub fn grid_size(text: &str) -> Result<GridSize, String> {
     let sizes: Option<Vec<usize>> = text
@@ -289,6 +300,77 @@ pub fn length_with_unit(text: &str) -> Result<f64, String> {
         length_m if length_m > 0.0 => Ok(length_m),
         _ => Err(format!(
             "invalid length {text:?}: expected a number above 0 and a unit, like 0.1mm"
+        )),
+    }
+}
+
+/// A bound of an uncertainty, 0 to `most`: a number, with one of `units` or without.
+fn bound(text: &str, units: &[&str], most: f64, example: &str) -> Result<f64, String> {
+    let trimmed = text.trim();
+    let bare = units.iter().find_map(|unit| trimmed.strip_suffix(unit));
+    match number(bare.unwrap_or(trimmed)) {
+        Ok(value) if (0.0..=most).contains(&value) => Ok(value),
+        _ => Err(format!(
+            "invalid bound {text:?}: expected 0 to {most}{}, like {example}",
+            units.first().unwrap_or(&"")
+        )),
+    }
+}
+
+/// How far a position may be off, m.
+pub fn sensor_error(text: &str) -> Result<f64, String> {
+    let length_m = length(text)?;
+    let most_m = Uncertainty::MOST.sensor_m;
+    if length_m <= most_m {
+        return Ok(length_m);
+    }
+    Err(format!(
+        "invalid bound {text:?}: expected 0 to {} mm, like 4mm",
+        1e3 * most_m
+    ))
+}
+
+/// How far a magnet may be tilted, degrees.
+pub fn tilt(text: &str) -> Result<f64, String> {
+    bound(
+        text,
+        &["deg", "\u{b0}"],
+        Uncertainty::MOST.tilt_deg,
+        "10deg",
+    )
+}
+
+/// An angle that is just noticed, degrees.
+pub fn direction_jnd(text: &str) -> Result<f64, String> {
+    match tilt(text) {
+        Ok(angle) if (1.0..=89.0).contains(&angle) => Ok(angle),
+        _ => Err(format!(
+            "invalid angle {text:?}: expected 1 to 89deg, like 25deg"
+        )),
+    }
+}
+
+/// How much warmer a magnet may become, C.
+pub fn heat(text: &str) -> Result<f64, String> {
+    bound(text, &["C", "K"], Uncertainty::MOST.heat_c, "20C")
+}
+
+/// How far a current may be off, a share.
+pub fn driver_error(text: &str) -> Result<f64, String> {
+    let most = Uncertainty::MOST.driver;
+    match text.trim().strip_suffix('%') {
+        Some(percent) => bound(percent, &[], 100.0 * most, "2%").map(|value| value / 100.0),
+        None => bound(text, &[], most, "0.02 or 2%"),
+    }
+}
+
+/// Power above 0, W.
+pub fn power(text: &str) -> Result<f64, String> {
+    let bare = text.trim().trim_end_matches('W');
+    match number(bare) {
+        Ok(value) if value > 0.0 => Ok(value),
+        _ => Err(format!(
+            "invalid power {text:?}: expected watts above 0, like 80 or 80W"
         )),
     }
 }

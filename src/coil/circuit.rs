@@ -8,7 +8,7 @@ use super::inductance::self_inductance_h;
 use fluxform_base::units::{
     COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
 };
-use fluxform_design::{Coil, Wire};
+use fluxform_design::{Coil, Driver, Supply, Wire};
 use fluxform_field::winding::Winding;
 
 /// Time constants after which a current counts as settled.
@@ -74,6 +74,12 @@ impl Circuit {
     /// R = rho(T) N pi (a1 + a2) / (pi d^2 / 4), rho(T) = rho (1 + alpha (T - 20 C)).
     #[must_use]
     pub fn of_air_coil(coil: &Coil, wire: &Wire) -> Self {
+        Self::of_inductance(coil, wire, self_inductance_h(&winding(coil, wire)))
+    }
+
+    /// The circuit of a coil whose inductance is known, as [`Circuit::of_air_coil`].
+    #[must_use]
+    pub fn of_inductance(coil: &Coil, wire: &Wire, inductance_h: f64) -> Self {
         let winding = winding(coil, wire);
         let wire_length_m = winding.turns * PI * (winding.inner_radius_m + winding.outer_radius_m);
         let section_m2 = 0.25 * PI * wire.conductor_diameter_m * wire.conductor_diameter_m;
@@ -82,7 +88,7 @@ impl Circuit {
         Self {
             turns: winding.turns,
             resistance_ohm: wire.resistivity_ohm_m * warmth * wire_length_m / section_m2,
-            inductance_h: self_inductance_h(&winding),
+            inductance_h,
             wire_length_m,
             wire_mass_kg: wire_length_m * section_m2 * COPPER_DENSITY_KG_PER_M3,
         }
@@ -98,6 +104,53 @@ impl Circuit {
     #[must_use]
     pub fn settling_s(&self) -> f64 {
         SETTLING_TIME_CONSTANTS * self.time_constant_s()
+    }
+
+    /// Time until less than exp(-5) of a step to `current_a` is left, s: five time constants where the
+    /// drivers set voltages; where they close a current loop, `L dI/dt` takes what voltage R I leaves, and
+    /// the loop's bandwidth ends it.
+    ///
+    /// The loop asks for `R I + L w (goal - I)`; while that exceeds the supply's voltage the current
+    /// rises as fast as that allows.
+    #[must_use]
+    pub fn settling_under_s(&self, supply: &Supply, current_a: f64) -> f64 {
+        self.step_s(supply, current_a, (-SETTLING_TIME_CONSTANTS).exp())
+            .unwrap_or_else(|| self.settling_s())
+    }
+
+    /// Time until the part `left` of a step to `current_a` is left under a current loop, s; `None`
+    /// where drivers set voltages.
+    #[must_use]
+    pub fn step_s(&self, supply: &Supply, current_a: f64, left: f64) -> Option<f64> {
+        match supply.driver {
+            Driver::Voltage => return None,
+            Driver::Current => {}
+        }
+        let pace = std::f64::consts::TAU * supply.bandwidth_hz;
+        let (inductive, most_a) = (
+            self.inductance_h * pace,
+            supply.voltage_v.map(|v| v / self.resistance_ohm),
+        );
+        let (Some(voltage_v), Some(most_a)) = (supply.voltage_v, most_a) else {
+            return Some(-left.ln() / pace);
+        };
+        let goal_a = (1.0 - left) * current_a;
+        // Where the loop asks for less than the supply has.
+        let taken_a = (inductive * current_a - voltage_v) / (inductive - self.resistance_ohm);
+        let taken_a = if inductive > self.resistance_ohm {
+            taken_a.max(0.0)
+        } else {
+            0.0
+        };
+        let rise_s = |until_a: f64| -self.time_constant_s() * (-until_a / most_a).ln_1p();
+        if current_a <= 0.0 {
+            return Some(0.0);
+        }
+        Some(if taken_a >= goal_a {
+            rise_s(goal_a)
+        } else {
+            rise_s(taken_a) + ((current_a - taken_a) / (left * current_a)).ln() / pace
+        })
     }
 
     /// Heat at a steady current, W.
@@ -165,6 +218,47 @@ mod tests {
             cold.rated_current_a(2.0, Some(6.0)),
             6.0 / cold.resistance_ohm
         );
+    }
+
+    /// Closed forms: all slew, all loop, and the voltage's own exponential where it has no headroom.
+    #[test]
+    fn a_current_loop_is_as_fast_as_voltage_or_bandwidth_let_it() {
+        let (coil, wire) = seed();
+        let circuit = Circuit {
+            inductance_h: 0.18,
+            ..Circuit::of_air_coil(&coil, &wire)
+        };
+        let supply = |voltage_v, bandwidth_hz| Supply {
+            current_max_a: vec![2.0],
+            current_min_a: vec![0.0],
+            total_current_max_a: None,
+            voltage_v,
+            driver: Driver::Current,
+            bandwidth_hz,
+        };
+        let left = 0.03;
+        let time = |voltage_v, hz| circuit.step_s(&supply(voltage_v, hz), 2.0, left).unwrap();
+        let tau = circuit.time_constant_s();
+        // So fast a loop that the supply alone counts.
+        let slew = -tau * (1.0 - circuit.resistance_ohm * 2.0 * (1.0 - left) / 36.0_f64).ln();
+        assert!((time(Some(36.0), 1e7) / slew - 1.0).abs() < 1e-4);
+        assert!((time(None, 700.0) * std::f64::consts::TAU * 700.0 + left.ln()).abs() < 1e-12);
+        assert_eq!(time(Some(1e9), 700.0), time(None, 700.0));
+        // A supply that just holds the current up: five time constants again.
+        let bare = Some(circuit.resistance_ohm * 2.0);
+        let five = circuit.settling_under_s(&supply(bare, 1e6), 2.0);
+        assert!((five / circuit.settling_s() - 1.0).abs() < 1e-9, "{five}");
+        // By steps of the loop's own law.
+        let (mut current, mut t, h) = (0.0_f64, 0.0, 1e-7);
+        let pace = std::f64::consts::TAU * 150.0;
+        while current < 2.0 * (1.0 - left) {
+            let asked =
+                circuit.resistance_ohm * current + circuit.inductance_h * pace * (2.0 - current);
+            current +=
+                h * (asked.min(36.0) - circuit.resistance_ohm * current) / circuit.inductance_h;
+            t += h;
+        }
+        assert!((time(Some(36.0), 150.0) / t - 1.0).abs() < 1e-4, "{t}");
     }
 
     #[test]

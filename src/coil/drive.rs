@@ -12,6 +12,10 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// The inductance matrix may be unsymmetric by this share of its largest entry: its error.
 const SYMMETRIC: f64 = 1e-2;
 
+/// A part of a step under a current loop, in time constants of the loop, and the most parts of a step.
+const PART: f64 = 0.1;
+const MOST_PARTS: f64 = 20_000.0;
+
 /// Why the currents of an array cannot be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DriveError {
@@ -144,6 +148,60 @@ impl Drive {
         }
     }
 
+    /// Lets a current loop of this bandwidth (Hz) bring the commanded currents (A) about for `step_s`,
+    /// each coil's difference falling by its exponential as long as the supply's voltage suffices.
+    ///
+    /// Voltages are held for short parts of the step, such that the currents at the end of each are
+    /// those of the loop: exact where no voltage is at its bound, else of first order in the part.
+    pub fn track(&mut self, command_a: &[f64], step_s: f64, bandwidth_hz: f64) {
+        let coils = self.root_ohm.len();
+        let pace = std::f64::consts::TAU * bandwidth_hz;
+        let parts = (step_s * pace / PART).ceil().clamp(1.0, MOST_PARTS);
+        let part_s = step_s / parts;
+        let kept = (-pace * part_s).exp();
+        let held: Vec<f64> = command_a
+            .iter()
+            .zip(&self.most_a)
+            .map(|(i, most)| i.clamp(-most, *most))
+            .collect();
+        let mut now = vec![0.0; coils];
+        for _ in 0..parts as usize {
+            self.currents(&mut now);
+            let off = now
+                .iter()
+                .zip(&held)
+                .map(|(now, goal)| (now - goal).abs())
+                .fold(0.0, f64::max);
+            if off == 0.0 {
+                break;
+            }
+            for (now, goal) in now.iter_mut().zip(&held) {
+                *now = goal + (*now - goal) * kept;
+            }
+            self.voltages_for(&mut now, part_s);
+            self.hold(&now, part_s);
+        }
+    }
+
+    /// Makes of the currents (A) that are to flow after `step_s` those whose voltages bring them about.
+    fn voltages_for(&mut self, currents_a: &mut [f64], step_s: f64) {
+        let before = self.now.clone();
+        self.settle_freely(currents_a);
+        for ((goal, before), tau) in self.now.iter_mut().zip(&before).zip(&self.time_constant_s) {
+            let decay = -step_s / tau;
+            *goal = before + (*goal - before) / -decay.exp_m1();
+        }
+        self.currents(currents_a);
+        self.now = before;
+    }
+
+    /// Lets currents flow whatever voltage holds them up.
+    fn settle_freely(&mut self, currents_a: &[f64]) {
+        let most = std::mem::replace(&mut self.most_a, vec![f64::INFINITY; currents_a.len()]);
+        self.settle(currents_a);
+        self.most_a = most;
+    }
+
     /// Writes the currents that flow, A.
     pub fn currents(&self, currents_a: &mut [f64]) {
         let coils = self.root_ohm.len();
@@ -188,6 +246,28 @@ mod tests {
         let mut now = [f64::NAN; 3];
         drive.currents(&mut now);
         now
+    }
+
+    #[test]
+    fn a_current_loop_follows_its_exponential_and_is_held_up_by_the_voltage() {
+        let mut drive = Drive::new(&L, &R, None).unwrap();
+        let goal = [1.3, -0.4, 0.7];
+        drive.track(&goal, 0.0021, 130.0);
+        let left = (-std::f64::consts::TAU * 130.0 * 0.0021_f64).exp();
+        for (now, goal) in currents(&drive).iter().zip(goal) {
+            assert!((now - goal * (1.0 - left)).abs() < 1e-9, "{now} {goal}");
+        }
+        // One coil on a bounded voltage reaches its current after -tau ln(1 - R I / V).
+        let mut drive = Drive::new(&[0.21], &[6.07], Some(36.0)).unwrap();
+        let slew_s = -(0.21 / 6.07) * (1.0 - 6.07 * 1.7 / 36.0_f64).ln();
+        drive.track(&[1.7], slew_s, 1e4);
+        let mut now = [0.0];
+        drive.currents(&mut now);
+        assert!((now[0] / 1.7 - 1.0).abs() < 5e-3, "{now:?}");
+        // The loop's own currents never pass the voltage's.
+        drive.track(&[9.0], 3.0, 1e3);
+        drive.currents(&mut now);
+        assert!((now[0] / (36.0 / 6.07) - 1.0).abs() < 1e-9, "{now:?}");
     }
 
     /// Regression: after a millionth of the time constant ten digits of the current were left.

@@ -33,6 +33,14 @@ pub enum LimitName {
     WireLength,
     /// Flux density in the core, T.
     CoreField,
+    /// Larger side of the rectangle that holds all coils, m.
+    Footprint,
+    /// Heat of all coils at their largest currents, W.
+    ArrayPower,
+    /// Mass of all coils and cores, kg.
+    ArrayMass,
+    /// Five time constants of the slowest coil among its neighbours, s.
+    ArraySettling,
     /// Turns over turns that fit; always holds.
     WindingFill,
     /// The supply's voltage, V, where the driver's current is the rated one.
@@ -89,6 +97,8 @@ pub struct Limit {
     pub direction: Direction,
     /// Whether it alone gives the force a maximum.
     pub ends_growth: bool,
+    /// Whether it is one of the whole array, not of a coil.
+    pub of_array: bool,
     /// The limit that a design sets, SI.
     pub of: fn(&Limits) -> Option<f64>,
     /// Its value in an evaluated coil, SI.
@@ -108,11 +118,60 @@ pub struct Evaluated<'a> {
     pub mass_kg: f64,
     /// Flux density in the core where there is one, T.
     pub core_field_t: Option<f64>,
+    /// Largest self inductance of a coil among its neighbours, H, where that is known.
+    pub array_inductance_h: Option<f64>,
 }
 
 impl Evaluated<'_> {
     fn coil(&self) -> Option<&Coil> {
         self.design.coil.as_ref()
+    }
+
+    /// Time until a step to the rated current has settled, s.
+    fn settling_s(&self, inductance_h: f64) -> f64 {
+        let supply = &self.design.supply;
+        let most_a = supply.current_max_a.iter().copied().fold(0.0, f64::max);
+        let current_a = self.circuit.rated_current_a(most_a, supply.voltage_v);
+        let circuit = Circuit {
+            inductance_h,
+            ..*self.circuit
+        };
+        circuit.settling_under_s(supply, current_a)
+    }
+
+    /// Larger side of the rectangle that holds all coils, m.
+    fn footprint_m(&self) -> Option<f64> {
+        let outer_m = self.coil()?.outer_diameter_m;
+        let side_m = |axis: usize| {
+            let ends = self
+                .design
+                .array
+                .positions_m
+                .iter()
+                .map(|place| place[axis]);
+            let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                [low.min(x), high.max(x)]
+            });
+            high - low + outer_m
+        };
+        Some(side_m(0).max(side_m(1)))
+    }
+
+    /// The most heat of all coils that drivers and supply allow, W: as many coils at their largest current
+    /// as the sum allows, for heat grows with the square.
+    fn array_power_w(&self) -> f64 {
+        let supply = &self.design.supply;
+        let limits = supply.current_max_a.iter().zip(&supply.current_min_a);
+        let rated = |limit_a: f64| self.circuit.rated_current_a(limit_a, supply.voltage_v);
+        let mut most_a: Vec<f64> = limits.map(|(up, down)| rated(up.max(-down))).collect();
+        most_a.sort_by(|a, b| b.total_cmp(a));
+        let mut left_a = supply.total_current_max_a.unwrap_or(f64::INFINITY);
+        let heat = most_a.into_iter().map(|most_a| {
+            let current_a = most_a.min(left_a);
+            left_a -= current_a;
+            self.circuit.power_w(current_a)
+        });
+        heat.sum()
     }
 }
 
@@ -140,6 +199,7 @@ const SIZE: Limit = Limit {
     step: MM,
     direction: Direction::AtMost,
     ends_growth: false,
+    of_array: false,
     of: |limits| limits.outer_diameter_max_m,
     value: |at| Some(at.coil()?.outer_diameter_m),
 };
@@ -152,7 +212,7 @@ const IMPLIED: Limit = Limit {
 };
 
 /// Every limit, in the order of [`LimitName`].
-pub static LIMITS: [Limit; 19] = [
+pub static LIMITS: [Limit; 23] = [
     SIZE,
     Limit {
         name: LimitName::InnerDiameter,
@@ -196,7 +256,7 @@ pub static LIMITS: [Limit; 19] = [
         step: ("ms", 1e3),
         ends_growth: true,
         of: |limits| limits.settling_max_s,
-        value: |at| Some(at.circuit.settling_s()),
+        value: |at| Some(at.settling_s(at.circuit.inductance_h)),
         ..SIZE
     },
     Limit {
@@ -248,6 +308,55 @@ pub static LIMITS: [Limit; 19] = [
         step: ("mT", 1e3),
         of: |limits| limits.core_field_max_t,
         value: |at| at.core_field_t,
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Footprint,
+        key: "footprint_m",
+        design_key: "limits.footprint_max_mm",
+        label: "footprint",
+        of_array: true,
+        of: |limits| limits.footprint_max_m,
+        value: |at| at.footprint_m(),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::ArrayPower,
+        key: "array_power_w",
+        design_key: "limits.array_power_max_w",
+        label: "heat of all coils",
+        unit: "W",
+        written: ("W", 1.0),
+        step: ("W", 1.0),
+        of_array: true,
+        of: |limits| limits.array_power_max_w,
+        value: |at| Some(at.array_power_w()),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::ArrayMass,
+        key: "array_mass_kg",
+        design_key: "limits.array_mass_max_kg",
+        label: "mass of all coils",
+        unit: "g",
+        written: ("kg", 1.0),
+        step: ("kg", 1.0),
+        of_array: true,
+        of: |limits| limits.array_mass_max_kg,
+        value: |at| Some(at.mass_kg * at.design.array.positions_m.len() as f64),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::ArraySettling,
+        key: "array_settling_s",
+        design_key: "limits.array_settling_max_ms",
+        label: "settling in the array",
+        unit: "s",
+        written: ("ms", 1e3),
+        step: ("ms", 1e3),
+        of_array: true,
+        of: |limits| limits.array_settling_max_s,
+        value: |at| Some(at.settling_s(at.array_inductance_h?)),
         ..SIZE
     },
     Limit {

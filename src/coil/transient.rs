@@ -39,8 +39,10 @@ use fluxform_field::winding::Winding;
 use fluxform_numerics::bessel::{j0_j1, zero_of_j1};
 use fluxform_numerics::gauss;
 
+/// Time constant of a current that is there at once, over the lag of the magnetisation.
+const AT_ONCE: f64 = 1e-3;
 /// Remainder of a step when it counts as settled.
-const LEFT: f64 = 0.05;
+pub const LEFT: f64 = 0.05;
 /// Modes that have decayed by exp(-45) at the earliest settling time are left out.
 const DECAYED: f64 = 45.0;
 /// More modes than this are refused.
@@ -154,6 +156,23 @@ impl VoltageStep {
                         .to_owned(),
             },
         })
+    }
+
+    /// Time to 95 % of the force after a current that is there at once, s: what eddy currents alone
+    /// cost where a loop drives the current.
+    ///
+    /// # Errors
+    /// As [`VoltageStep::settling`].
+    pub fn eddies_95_s(&self) -> Result<f64, TransientError> {
+        let lag_s = self.settling()?.lag_s;
+        if lag_s <= 0.0 {
+            return Ok(0.0);
+        }
+        let at_once = Self {
+            resistance_ohm: self.inductance_h / (AT_ONCE * lag_s),
+            ..*self
+        };
+        Ok(at_once.settling()?.force_95_s)
     }
 
     fn validate(&self) -> Result<(), TransientError> {

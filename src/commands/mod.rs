@@ -19,7 +19,7 @@ pub mod sweep;
 pub mod verify;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
+use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use clap::error::ErrorKind;
@@ -27,9 +27,10 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::bundle::artefact::SCHEMA_VERSION;
 use crate::cli::args::Common;
+use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::printer::Printer;
-use crate::cli::shell::{self, Program};
+use crate::cli::shell::{self, Captured, Program, Watch};
 use crate::cli::{explain, help};
 
 /// The crate's version, and the revision of a release build.
@@ -91,9 +92,19 @@ enum Command {
     Man(man::Man),
 }
 
-/// Runs the command line and returns the process's exit code.
-pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
+/// Runs the command line and returns how the process ends.
+pub fn main(args: impl Iterator<Item = OsString>) -> Exit {
     shell::main::<Arguments>(args)
+}
+
+/// Runs the command line inside another program: nothing is printed, the result is returned. `given` are
+/// documents in memory, read in place of the files of their names; `watch` shows how far the job is.
+pub fn captured(
+    args: &[OsString],
+    given: Vec<(PathBuf, String)>,
+    watch: Watch,
+) -> (Captured, Result<(), Failure>) {
+    shell::captured::<Arguments>(args, given, watch)
 }
 
 impl Program for Arguments {

@@ -2,8 +2,10 @@
 
 use super::limits::{self, Limits};
 use super::reader::{Located, Section};
+use super::search::{self, SearchSpace};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
+use fluxform_base::uncertainty::Uncertainty;
 
 /// A command's requirements on a design. Coils that it does not place may overlap, with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,8 +82,10 @@ pub(super) struct Draft {
     pub(super) magnet: MagnetDraft,
     pub(super) supply: SupplyDraft,
     pub(super) limits: Limits,
+    pub(super) uncertainty: Uncertainty,
     pub(super) target_height: Located<f64>,
     pub(super) workspace: WorkspaceDraft,
+    pub(super) search: SearchSpace,
 }
 
 impl Draft {
@@ -101,8 +105,10 @@ impl Draft {
             magnet: sections::magnet(root.section("magnet")),
             supply: sections::supply(root.section("supply")),
             limits: limits::read(root.section("limits")),
+            uncertainty: sections::uncertainty(root.section("uncertainty")),
             target_height: sections::target_height_mm(root.section("target")),
             workspace: sections::workspace(root.section("workspace")),
+            search: search::read(root.section("search")),
         }
     }
 }

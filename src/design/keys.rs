@@ -13,7 +13,8 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[array]\n[magnet]\n[supply]\n[limits]\n\
-                            [target]\n[workspace]\n";
+                            [uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
+                            [search.core]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
     });
@@ -71,6 +72,10 @@ const MEANINGS: &[(&str, &str)] = &[
         "core.conductivity_s_per_m",
         "of the steel, for its eddy currents",
     ),
+    (
+        "core.lamination_mm",
+        "thickness of the core's sheets; without it the core is solid",
+    ),
     ("array.positions_mm", "the coils' axes, instead of a grid"),
     ("array.rows", "rows of the grid, along y"),
     ("array.columns", "columns of the grid, along x"),
@@ -119,6 +124,14 @@ const MEANINGS: &[(&str, &str)] = &[
         "limits the current by the resistance, and how fast it follows",
     ),
     (
+        "supply.driver",
+        "whether drivers set voltages, or currents in a closed loop; without it `voltage`",
+    ),
+    (
+        "supply.bandwidth_hz",
+        "bandwidth of a current loop; without it 1000",
+    ),
+    (
         "limits.resistance_max_ohm",
         "resistance at the wire's temperature",
     ),
@@ -137,6 +150,35 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.wire_length_max_m", "length of the wire"),
     ("limits.core_field_max_t", "flux density in the core"),
     (
+        "limits.footprint_max_mm",
+        "larger side of the rectangle that holds all coils",
+    ),
+    (
+        "limits.array_power_max_w",
+        "heat of all coils at the largest currents that the supply allows",
+    ),
+    ("limits.array_mass_max_kg", "mass of all coils and cores"),
+    (
+        "limits.array_settling_max_ms",
+        "five time constants of the slowest coil among its neighbours",
+    ),
+    (
+        "uncertainty.sensor_mm",
+        "how far the magnet may be from where it is measured, along each axis",
+    ),
+    (
+        "uncertainty.tilt_deg",
+        "how far the finger may tilt the magnet, in any direction",
+    ),
+    (
+        "uncertainty.heat_c",
+        "how much warmer the magnet may become",
+    ),
+    (
+        "uncertainty.driver_percent",
+        "by how much each driver's current may be off",
+    ),
+    (
         "target.height_mm",
         "height of the magnet's centre above the winding, for `evaluate` and `optimize`",
     ),
@@ -145,6 +187,55 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "workspace.z_mm",
         "nodes of the map along z, above the windings' top",
+    ),
+    (
+        "search.coil.inner_diameter_mm",
+        "range `[from, to]` in which `optimize --for` looks for the bore; one value or three and more are choices",
+    ),
+    (
+        "search.coil.outer_diameter_mm",
+        "range of the outer diameter",
+    ),
+    (
+        "search.coil.length_mm",
+        "range of the winding's length; layers and turns are whole",
+    ),
+    (
+        "search.wire.diameter_mm",
+        "wires to choose from, over the insulation",
+    ),
+    (
+        "search.core.clearance_mm",
+        "range of the gap between core and bore",
+    ),
+    ("search.core.above_mm", "range of the core's top"),
+    ("search.core.below_mm", "range of the core's bottom"),
+    (
+        "search.core.none",
+        "whether coils without cores are tried too",
+    ),
+    ("search.array.pitch_mm", "range of the pitch"),
+    ("search.array.rows", "numbers of rows to choose from"),
+    ("search.array.columns", "numbers of columns to choose from"),
+    (
+        "search.array.move_mm",
+        "range in which coils move along x and y, off their layout",
+    ),
+    (
+        "search.array.layout",
+        "layouts to choose from: a grid, rows shifted by half a pitch, a ring about one coil",
+    ),
+    (
+        "search.array.symmetry",
+        "which coils move alike; without it `square`",
+    ),
+    (
+        "search.magnet.size_mm",
+        "diameters and lengths of magnets to choose from",
+    ),
+    (
+        "search.shapes.height_mm",
+        "range by which all shapes are raised",
     ),
 ];
 

@@ -43,6 +43,7 @@ pub mod named_file;
 pub mod parse;
 pub mod reader;
 pub mod rule;
+pub mod search;
 mod sections;
 pub mod source;
 pub mod template;

@@ -25,6 +25,14 @@ pub struct Limits {
     pub wire_length_max_m: Option<f64>,
     /// Flux density in the core, T.
     pub core_field_max_t: Option<f64>,
+    /// Side of the square that holds all coils, m.
+    pub footprint_max_m: Option<f64>,
+    /// Heat of all coils at their largest currents, W.
+    pub array_power_max_w: Option<f64>,
+    /// Mass of all coils with their cores, kg.
+    pub array_mass_max_kg: Option<f64>,
+    /// Five time constants of the slowest coil among its neighbours, s.
+    pub array_settling_max_s: Option<f64>,
 }
 
 const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
@@ -42,6 +50,10 @@ pub(crate) fn read(mut s: Section<'_>) -> Limits {
         mass_max_kg: limit("mass_max_kg", Rule::any("kg")),
         wire_length_max_m: limit("wire_length_max_m", Rule::any("m")),
         core_field_max_t: limit("core_field_max_t", Rule::any("T")),
+        footprint_max_m: limit("footprint_max_mm", BODY_MM).map(m_from_mm),
+        array_power_max_w: limit("array_power_max_w", Rule::any("W")),
+        array_mass_max_kg: limit("array_mass_max_kg", Rule::any("kg")),
+        array_settling_max_s: limit("array_settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
     };
     s.finish();
     limits

@@ -2,9 +2,11 @@
 
 use super::key::Assumed;
 use super::limits::Limits;
+use super::search::SearchSpace;
 use std::path::{Path, PathBuf};
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
+use fluxform_base::uncertainty::Uncertainty;
 use fluxform_numerics::axis::Axis;
 
 /// A validated design.
@@ -24,12 +26,16 @@ pub struct Design {
     pub magnet: Magnet,
     /// Current and voltage limits.
     pub supply: Supply,
+    /// What is not exactly known of the display in use.
+    pub uncertainty: Uncertainty,
     /// Limits that `evaluate` and `optimize` check.
     pub limits: Limits,
     /// Height of the magnet's centre above the winding's top face at the target, m.
     pub target_height_m: f64,
     /// Grid on which maps are tabulated.
     pub workspace: Workspace,
+    /// What `optimize --for` may vary.
+    pub search: SearchSpace,
     /// The keys that decide numbers of the command that reads the design and have their defaults,
     /// because they were not written.
     pub assumed: Vec<Assumed>,
@@ -100,6 +106,8 @@ pub struct Core {
     pub knee_t: Option<f64>,
     /// Conductivity, S/m, for the transient estimate.
     pub conductivity_s_per_m: f64,
+    /// Thickness of its sheets, m; `None` for a solid core.
+    pub lamination_m: Option<f64>,
 }
 
 /// How the neighbours' cores are treated.
@@ -194,6 +202,26 @@ pub struct Supply {
     pub total_current_max_a: Option<f64>,
     /// Supply voltage, V.
     pub voltage_v: Option<f64>,
+    /// What the drivers set.
+    pub driver: Driver,
+    /// Bandwidth of drivers that set currents, Hz.
+    pub bandwidth_hz: f64,
+}
+
+/// Bandwidth of drivers that set currents where none is given, Hz: an ordinary servo amplifier's.
+pub const BANDWIDTH_HZ: f64 = 1000.0;
+
+/// What drivers set.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
+pub enum Driver {
+    /// A voltage: the current follows by the coil's time constant
+    #[default]
+    Voltage,
+    /// A current: a loop uses the supply's voltage to bring it about
+    Current,
 }
 
 impl Design {

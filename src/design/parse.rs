@@ -5,7 +5,9 @@ use std::path::Path;
 use super::checks;
 use super::diagnostics::{Faults, InvalidDocument};
 use super::draft::{Draft, Need};
-use super::model::{Array, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace};
+use super::model::{
+    Array, BANDWIDTH_HZ, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace,
+};
 use super::reader::{Sink, read_document};
 use super::sections::{CoilDraft, CoreDraft, Layout, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
@@ -85,8 +87,10 @@ impl Draft {
             magnet: magnet_m(&self.magnet),
             supply: supply_of(self.supply, coils),
             limits: self.limits,
+            uncertainty: self.uncertainty,
             target_height_m: m_from_mm(self.target_height.value),
             workspace: workspace_m(&self.workspace)?,
+            search: self.search,
             assumed: sink
                 .assumed()
                 .into_iter()
@@ -127,6 +131,7 @@ fn core_m(draft: CoreDraft, path: &Path) -> Core {
             None => Steel::Linear(draft.relative_permeability),
         },
         conductivity_s_per_m: draft.conductivity_s_per_m,
+        lamination_m: draft.lamination.map(m_from_mm),
     }
 }
 
@@ -152,6 +157,8 @@ fn supply_of(draft: SupplyDraft, coils: usize) -> Supply {
         current_min_a: each(draft.current_min_a.value),
         total_current_max_a: draft.total_current_max_a,
         voltage_v: draft.voltage_v,
+        driver: draft.driver,
+        bandwidth_hz: draft.bandwidth_hz.map_or(BANDWIDTH_HZ, |hz| hz.value),
     }
 }
 

@@ -5,10 +5,11 @@
 
 use super::array::{COILS_MAX, grid_positions_m};
 use super::message_text::number;
-use super::model::{ArrayGrid, Coupling, MagnetModel, Polarity};
+use super::model::{ArrayGrid, Coupling, Driver, MagnetModel, Polarity};
 use super::reader::{Located, Section};
 use super::rule::{BODY_MM, Bound, Rule, metres_below, slip};
 use super::values::OneOrMany;
+use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 use fluxform_numerics::axis::Axis;
 
@@ -25,12 +26,12 @@ const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
 
 /// Sizes of magnets, mm.
-const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
+pub(super) const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
 /// Gaps and overhangs, mm.
-const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
+pub(super) const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
 /// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
 /// conductor is named, it is taken as the diameter over the insulation too.
-const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
+pub(super) const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
 /// Metals lie between 1e-8 and 2e-6.
 const RESISTIVITY_OHM_M: Rule = Rule::any("ohm m").slips(&[
     slip(0.0, 1e-9, "a slip of the exponent", 1.0),
@@ -51,6 +52,7 @@ const RELATIVE_PERMEABILITY: Rule = Rule::any("").bound(Bound::Within(1.0, 1e9))
     slip(0.125, 1.0, "thousands", 1000.0),
 ]);
 const AMPERE: Rule = Rule::any("A");
+const BANDWIDTH_HZ: Rule = Rule::any("Hz");
 
 /// `[coil]`, mm.
 #[derive(Debug)]
@@ -116,6 +118,7 @@ pub struct CoreDraft {
     pub bh_curve: Option<String>,
     pub knee_t: Option<f64>,
     pub conductivity_s_per_m: f64,
+    pub lamination: Option<f64>,
 }
 
 pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
@@ -140,6 +143,9 @@ pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
         conductivity_s_per_m: s
             .number_or("conductivity_s_per_m", &CONDUCTIVITY_S_PER_M, 5.8e6)
             .value,
+        lamination: s
+            .number("lamination_mm", &OFFSET_MM.positive())
+            .map(|sheet| sheet.value),
     });
     if s.has("relative_permeability") && s.has("bh_curve") {
         let message = "relative_permeability and bh_curve exclude each other";
@@ -330,6 +336,8 @@ pub struct SupplyDraft {
     pub current_min_a: Located<OneOrMany>,
     pub total_current_max_a: Option<f64>,
     pub voltage_v: Option<f64>,
+    pub driver: Driver,
+    pub bandwidth_hz: Option<Located<f64>>,
 }
 
 pub fn supply(mut s: Section<'_>) -> SupplyDraft {
@@ -342,9 +350,43 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
         voltage_v: s
             .number("voltage_v", &Rule::any("V").positive())
             .map(|v| v.value),
+        driver: s.choice("driver").unwrap_or_default(),
+        bandwidth_hz: s.number("bandwidth_hz", &BANDWIDTH_HZ.positive()),
     };
+    if draft.driver == Driver::Voltage && draft.bandwidth_hz.is_some() {
+        let message = "bandwidth_hz is that of a current loop, but the driver sets voltages";
+        s.fault(
+            "bandwidth_hz",
+            message,
+            "add driver = \"current\", or leave bandwidth_hz out",
+        );
+    }
     s.finish();
     draft
+}
+
+/// `[uncertainty]`.
+pub fn uncertainty(mut s: Section<'_>) -> Uncertainty {
+    let mut bound = |key, rule: Rule, most| {
+        let given = s.number(key, &rule.bound(Bound::Within(0.0, most)));
+        given.map_or(0.0, |bound| bound.value)
+    };
+    let uncertainty = Uncertainty {
+        sensor_m: m_from_mm(bound(
+            "sensor_mm",
+            OFFSET_MM,
+            1e3 * Uncertainty::MOST.sensor_m,
+        )),
+        tilt_deg: bound("tilt_deg", Rule::any("degrees"), Uncertainty::MOST.tilt_deg),
+        heat_c: bound("heat_c", Rule::any("C"), Uncertainty::MOST.heat_c),
+        driver: bound(
+            "driver_percent",
+            Rule::any("%"),
+            100.0 * Uncertainty::MOST.driver,
+        ) / 100.0,
+    };
+    s.finish();
+    uncertainty
 }
 
 /// Height of the magnet's centre, mm.

@@ -135,13 +135,13 @@ impl<'a> Section<'a> {
         self.list(key, || of_tuple(N, rule), || Without::Nothing);
         let found = self.found(key)?;
         let mut values = [f64::NAN; N];
-        let wanted = format!("a list of {N} numbers");
-        let items = self.items(key, found, &wanted);
+        let expected = format!("a list of {N} numbers");
+        let items = self.items(key, found, &expected);
         if items.len() == N {
             values.copy_from_slice(&self.checked_items(key, items, rule));
             self.warn_of_slip(key, &values, rule, found);
         } else if !items.is_empty() {
-            let message = format!("expected {wanted}, found {}", items.len());
+            let message = format!("expected {expected}, found {}", items.len());
             self.fault(key, message, "write them in square brackets, with commas");
         }
         Some(values)
@@ -357,6 +357,35 @@ impl<'a> Section<'a> {
         None
     }
 
+    /// Variants of `T` by name, each once; empty where absent or at fault.
+    pub fn choices<T: Choice + PartialEq>(&mut self, key: &'static str) -> Vec<T> {
+        let value = || Accepts::any(format!("list of {}", choices::<T>()));
+        self.list(key, value, || Without::Nothing);
+        let Some(found) = self.found(key) else {
+            return Vec::new();
+        };
+        let mut chosen = Vec::new();
+        for item in self.items(key, found, "a list of names") {
+            let DeValue::String(text) = item.get_ref() else {
+                self.add_wrong_type(&self.path_of(key), item, "a name in quotes");
+                continue;
+            };
+            match text.parse::<T>() {
+                Ok(value) if !chosen.contains(&value) => chosen.push(value),
+                Ok(_) => self.fault(
+                    key,
+                    format!("{text:?} is there twice"),
+                    "give each name once",
+                ),
+                Err(_) => {
+                    let message = format!("expected {}, found {}", choices::<T>(), quoted(text));
+                    self.fault(key, message, "choose among them");
+                }
+            }
+        }
+        chosen
+    }
+
     /// True or false; the default where absent or at fault.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
         let value = || Accepts::any("true or false");
@@ -371,12 +400,12 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn items(&self, key: &str, found: ValueRef<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
+    fn items(&self, key: &str, found: ValueRef<'a>, expected: &str) -> &'a [Spanned<DeValue<'a>>] {
         match found.get_ref() {
             DeValue::Array(items) if items.is_empty() => {
                 self.fault(
                     key,
-                    format!("expected {wanted}, found an empty list"),
+                    format!("expected {expected}, found an empty list"),
                     "leave the key out for its default",
                 );
             }
@@ -388,7 +417,7 @@ impl<'a> Section<'a> {
                 );
             }
             DeValue::Array(items) => return items,
-            _ => self.add_wrong_type(&self.path_of(key), found, wanted),
+            _ => self.add_wrong_type(&self.path_of(key), found, expected),
         }
         &[]
     }
@@ -406,12 +435,12 @@ impl<'a> Section<'a> {
             other => float(other),
         };
         let Some(value) = value else {
-            let wanted = if rule.gauges {
+            let expected = if rule.gauges {
                 "a number or a gauge like \"AWG 22\""
             } else {
                 "a number"
             };
-            let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+            let message = format!("expected {expected}, found {}", described(found.get_ref()));
             let fault = Fault::error(path, message).at(&found.span());
             self.sink
                 .add(match quoted_number(found.get_ref(), rule.unit) {
@@ -455,8 +484,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, wanted: &str) {
-        let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, expected: &str) {
+        let message = format!("expected {expected}, found {}", described(found.get_ref()));
         self.sink.add(Fault::error(path, message).at(&found.span()));
     }
 }

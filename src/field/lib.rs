@@ -29,6 +29,7 @@ pub mod batch;
 pub mod components;
 pub mod dipole;
 pub mod frame;
+pub mod iron;
 pub mod magnet;
 pub mod ring;
 pub mod source;

@@ -8,6 +8,7 @@ pub mod chebyshev;
 pub mod dispatch;
 pub mod double_double;
 pub mod dual;
+pub mod front;
 pub mod gauss;
 pub mod gmres;
 pub mod interval;

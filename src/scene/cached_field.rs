@@ -31,7 +31,7 @@ use crate::shape::certificate::Certificate;
 use crate::shape::document::ShapeDocument;
 
 /// Name of the folder beside a design's bundles.
-pub const STORE_FOLDER: &str = ".fluxform-kept";
+pub const STORE_FOLDER: &str = ".fluxform-cache";
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
 

@@ -20,7 +20,9 @@ pub struct SceneCore {
     /// Flux density above which a warning is due, T.
     pub knee_t: f64,
     /// S/m.
-    pub conductivity_s_per_m: f64,
+    conductivity_s_per_m: f64,
+    /// Thickness of its sheets, m.
+    lamination_m: Option<f64>,
     /// The table of the magnetisation curve as it was parsed.
     pub curve_text: Option<String>,
     /// Warnings about the material.
@@ -38,6 +40,19 @@ pub enum Material {
 }
 
 impl SceneCore {
+    /// Conductivity of a solid core whose slowest eddy currents die out as fast, S/m: those of a
+    /// sheet of thickness d in mu sigma (d / pi)^2, those of a cylinder of radius a in mu sigma (a / x)^2,
+    /// x the first zero of J_0.
+    #[must_use]
+    pub fn conductivity_s_per_m(&self) -> f64 {
+        const FIRST_ZERO: f64 = 2.404_825_557_695_773;
+        let Some(sheet_m) = self.lamination_m else {
+            return self.conductivity_s_per_m;
+        };
+        let share = FIRST_ZERO * sheet_m / (std::f64::consts::PI * self.shape.radius_m);
+        self.conductivity_s_per_m * (share * share).min(1.0)
+    }
+
     /// The core that `core` describes in the bore of `winding`.
     ///
     /// # Errors
@@ -71,6 +86,7 @@ impl SceneCore {
             material,
             knee_t: knee_t.unwrap_or(f64::INFINITY),
             conductivity_s_per_m: core.conductivity_s_per_m,
+            lamination_m: core.lamination_m,
             curve_text,
             warnings,
         })

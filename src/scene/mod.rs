@@ -34,7 +34,9 @@ use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
+use crate::lambda::uncertainty::Turned;
 use crate::map::tabulate::PlacedCoil;
+use crate::numerics::vec3::{cross, dot};
 use crate::progress::Progress;
 use crate::scene::core_material::SceneCore;
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
@@ -246,7 +248,8 @@ impl<'a> Scene<'a> {
     }
 
     /// Height of the highest winding or core, m.
-    fn sources_top_m(&self) -> f64 {
+    #[must_use]
+    pub fn sources_top_m(&self) -> f64 {
         self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0))
     }
 
@@ -304,7 +307,21 @@ impl<'a> Scene<'a> {
         self.forces::<3>(solved, points_m, progress)
     }
 
-    /// The last `N` components of the force.
+    /// As [`Scene::force_vectors_n_per_a`], for the moment along its own axis, then turned onto two axes
+    /// across it; the magnet's body does not turn.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn turned_forces_n_per_a(
+        &self,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Turned>, RunError> {
+        self.forces::<9>(solved, points_m, progress)
+    }
+
+    /// The last `N` components of the force; of 9 those of three moments.
     fn forces<const N: usize>(
         &self,
         solved: &Solved,
@@ -374,6 +391,8 @@ impl<'a> Scene<'a> {
         rows: &mut [[f64; N]],
     ) -> Result<(), RunError> {
         let coils = self.coils.len();
+        let components = N.min(3);
+        let axes = axes_of(self.moment_a_m2);
         let whole = N > 1 || !rule.is_upright();
         let parts = match (whole, rule.is_upright()) {
             (false, _) => Components::Gz,
@@ -388,6 +407,11 @@ impl<'a> Scene<'a> {
         let tolerance = share * solved.tolerance / rule.amplification();
         for node in rule.nodes() {
             let m_z = node.moment_a_m2[2];
+            let along = dot(node.moment_a_m2, axes[0]);
+            let moments = match N {
+                9 => axes.map(|axis| axis.map(|part| along * part)).to_vec(),
+                _ => vec![node.moment_a_m2],
+            };
             let places: Vec<[f64; 3]> = points_m
                 .iter()
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
@@ -410,18 +434,20 @@ impl<'a> Scene<'a> {
                 let block = parts.count() * count;
                 let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {
-                    let mut force = [0.0, 0.0, m_z * air.dbz_dz[row]];
-                    if whole {
-                        let (dx, dy) = offset(place);
-                        force = axial_force_n(node.moment_a_m2, &air, row, [dx, dy]);
-                    }
-                    if let Some(steel) = steel {
-                        let added = force_n(node.moment_a_m2, parts, steel, row);
-                        force = std::array::from_fn(|i| force[i] + added[i]);
-                    }
-                    let sums = &mut rows[row * coils + column];
-                    for (sum, value) in sums.iter_mut().zip(&force[3 - N..]) {
-                        *sum += coil.gain * value;
+                    let sums = rows[row * coils + column].chunks_exact_mut(components);
+                    for (moment_a_m2, sums) in moments.iter().zip(sums) {
+                        let mut force = [0.0, 0.0, m_z * air.dbz_dz[row]];
+                        if whole {
+                            let (dx, dy) = offset(place);
+                            force = axial_force_n(*moment_a_m2, &air, row, [dx, dy]);
+                        }
+                        if let Some(steel) = steel {
+                            let added = force_n(*moment_a_m2, parts, steel, row);
+                            force = std::array::from_fn(|i| force[i] + added[i]);
+                        }
+                        for (sum, value) in sums.iter_mut().zip(&force[3 - components..]) {
+                            *sum += coil.gain * value;
+                        }
                     }
                 }
             }
@@ -486,6 +512,23 @@ pub fn coupled(design: &Design) -> bool {
 
 fn largest(currents_a: &[f64]) -> f64 {
     currents_a.iter().copied().fold(0.0, f64::max)
+}
+
+/// Unit vectors along a moment and across it.
+fn axes_of(moment_a_m2: [f64; 3]) -> [[f64; 3]; 3] {
+    let unit = |v: [f64; 3]| {
+        let length = dot(v, v).sqrt();
+        v.map(|part| part / length)
+    };
+    let along = unit(moment_a_m2);
+    // The axis that the moment is farthest from being along.
+    let other = if along[0].abs() < 0.8 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
+    };
+    let third = unit(cross(along, other));
+    [along, cross(third, along), third]
 }
 
 /// Force on a dipole in an axial field, N (per ampere if that is), `dx_dy_m` off its axis:

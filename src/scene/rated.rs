@@ -89,14 +89,7 @@ impl Rated {
             .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
         let target = single.target(scene, current_a)?;
-        let limits = limits::check(&Evaluated {
-            design: scene.design,
-            circuit: &circuit,
-            power_w,
-            mass_kg,
-            core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
-        });
-        Ok(Self {
+        let mut rated = Self {
             coil: CoilSummary {
                 size: CoilSize::from(&scene.coil),
                 turns: circuit.turns,
@@ -114,10 +107,31 @@ impl Rated {
             target,
             relative_permeability: single.relative_permeability,
             core: single.core,
-            limits,
+            limits: BTreeMap::new(),
             accuracy_missed: missed(&single.accuracy, single.tolerance),
             accuracy: single.accuracy,
             warnings: single.warnings,
-        })
+        };
+        // A coil alone is its own array.
+        let alone = (scene.coils.len() == 1).then_some(circuit.inductance_h);
+        rated.check_limits(scene, alone);
+        Ok(rated)
+    }
+
+    /// Checks the design's limits; `array_inductance_h` is the largest self inductance among the
+    /// neighbours, where that is known.
+    pub(crate) fn check_limits(&mut self, scene: &Scene, array_inductance_h: Option<f64>) {
+        let summary = &self.coil.circuit;
+        self.limits = limits::check(&Evaluated {
+            design: scene.design,
+            circuit: &Circuit {
+                inductance_h: summary.inductance_h,
+                ..scene.circuit
+            },
+            power_w: summary.power_w,
+            mass_kg: summary.mass_kg,
+            core_field_t: self.core.as_ref().map(|core| core.peak_field_t),
+            array_inductance_h,
+        });
     }
 }

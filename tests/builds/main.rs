@@ -129,7 +129,7 @@ impl Way {
             tree.insert(name.to_owned(), self.run(&place, args));
         }
         // Cached values are no artefacts, and seconds are no numbers of the model.
-        tree.retain(|path, _| !path.contains(".fluxform-kept") && !path.contains("timing"));
+        tree.retain(|path, _| !path.contains(".fluxform-cache") && !path.contains("timing"));
         tree
     }
 }

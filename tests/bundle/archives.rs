@@ -36,7 +36,7 @@ pub fn trials() -> Vec<Trial> {
 pub fn python_loads(bundle: &Path) -> Ran {
     let mut python = Command::new("python3");
     python
-        .arg(root().join("scripts/load_bundle.py"))
+        .arg(root().join("src/python/fluxform/load_bundle.py"))
         .arg(bundle);
     python.env("PYTHONDONTWRITEBYTECODE", "1");
     Ran::of(python.output().unwrap())
@@ -310,7 +310,7 @@ fn files_of_holes_are_refused_by_python_before_they_are_read() {
         let mut python = Command::new("sh");
         python
             .args(["-c", "ulimit -v 2000000; exec python3 \"$0\" \"$1\""])
-            .arg(root().join("scripts/load_bundle.py"))
+            .arg(root().join("src/python/fluxform/load_bundle.py"))
             .arg(target)
             .env("OPENBLAS_NUM_THREADS", "1")
             .env("PYTHONDONTWRITEBYTECODE", "1");

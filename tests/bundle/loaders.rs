@@ -165,7 +165,7 @@ impl Loader {
                 let mut python = Command::new("python3");
                 python
                     .args(["-c", PYTHON_READS_STDIN])
-                    .arg(root().join("scripts"));
+                    .arg(root().join("src/python/fluxform"));
                 python.arg(bundle).env("PYTHONDONTWRITEBYTECODE", "1");
                 ("Python", python)
             }

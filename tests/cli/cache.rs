@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use fluxform_testing::place::Place;
 
-const KEPT: &str = "results/seed/.fluxform-kept";
+const KEPT: &str = "results/seed/.fluxform-cache";
 const FILES: [&str; 5] = [
     "manifest.json",
     "map.npz",

@@ -177,7 +177,7 @@ fn a_link_named_like_a_folder_put_aside_empties_no_folder() {
     std::fs::create_dir_all(place.path("victim/deep")).unwrap();
     place.write("victim/deep/thesis.tex", "years");
     let victim = place.path("victim");
-    let kept = place.path("results/seed_air/.fluxform-kept");
+    let kept = place.path("results/seed_air/.fluxform-cache");
     let _ = std::fs::remove_dir_all(&kept);
     let own = "results/seed_air";
     for name in [

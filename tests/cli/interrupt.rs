@@ -71,13 +71,13 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
         entries.map(|entry| name(entry.unwrap())).collect()
     };
     let left = files("results/seed_air");
-    let finished = [".fluxform-kept", "flat"].map(str::to_owned);
+    let finished = [".fluxform-cache", "flat"].map(str::to_owned);
     assert_eq!(
         left,
         finished.into(),
         "what was finished is kept, nothing else"
     );
-    let kept = files("results/seed_air/.fluxform-kept");
+    let kept = files("results/seed_air/.fluxform-cache");
     assert!(
         kept.iter().all(|name| name.ends_with(".points")),
         "{kept:?}"
@@ -294,7 +294,7 @@ fn waiting_for_another_run_is_reported_and_ends_at_a_signal() {
     let left = place.path("results/seed_air").read_dir().unwrap();
     let names: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
     assert!(
-        names.iter().all(|name| name == ".fluxform-kept"),
+        names.iter().all(|name| name == ".fluxform-cache"),
         "{names:?}"
     );
 }

@@ -263,8 +263,8 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
         "relative to the rms force / %",
         "I / A",
         "coil 8",
-        "given - wanted / mN",
-        "wanted / mN",
+        "given - requested / mN",
+        "requested / mN",
         "with feedback",
         "maxmin",
     ] {

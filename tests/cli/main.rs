@@ -14,6 +14,7 @@ mod lambda;
 mod messages;
 mod mistakes;
 mod optimize;
+mod optimize_array;
 mod placement;
 mod scan;
 mod screen;
@@ -21,6 +22,7 @@ mod steel;
 mod streams;
 mod surfaces;
 mod sweep;
+mod uncertainty;
 mod verify;
 mod weights;
 

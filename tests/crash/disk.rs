@@ -113,7 +113,7 @@ pub fn file_limit(prepared: &Prepared, steps: usize, random: &mut Random) -> Res
     let artefacts = prepared
         .after
         .iter()
-        .filter(|(path, _)| !path.contains(".fluxform-kept"));
+        .filter(|(path, _)| !path.contains(".fluxform-cache"));
     let largest = artefacts.map(|(_, bytes)| bytes.len()).max().unwrap_or(0);
     let mut row = Row::new(prepared.scenario.name, "a limit on the size of a file");
     for step in 0..steps {

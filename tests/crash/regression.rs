@@ -113,10 +113,10 @@ fn temporary_files_of_a_killed_run_go_with_no_cache() {
         "--no-report",
     ];
     place.run(&args).ended_with(&[0]).unwrap();
-    place.write("out/two/.fluxform-kept/.fluxform-7Xq.tmp", "");
+    place.write("out/two/.fluxform-cache/.fluxform-7Xq.tmp", "");
     let again = [&args[..], &["--no-cache"]].concat();
     place.run(&again).ended_with(&[0]).unwrap();
-    assert!(!place.path(OUT).join("two/.fluxform-kept").exists());
+    assert!(!place.path(OUT).join("two/.fluxform-cache").exists());
 }
 
 fn two_plans_at_once_do_not_share_a_folder() {

@@ -8,13 +8,15 @@ use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [the_table_of_what_one_percent_changes_is_true, the_warnings_of_the_table_are_what_is_said, the_tutorial_runs_and_prints_what_it_shows],
+        None => [the_table_of_what_one_percent_changes_is_true, the_warnings_of_the_table_are_what_is_said, the_tutorial_runs_and_prints_what_it_shows, the_better_display_is_found_as_shown],
         needs::numpy() => [the_tutorial_runs_with_python],
         needs::c_compiler() => [the_tutorial_runs_with_a_c_compiler],
         needs::octave() => [the_tutorial_runs_with_octave],
     }
 }
 
+/// The tutorial of arrays.
+const BETTER: &str = "designs/better_display.md";
 const TUTORIAL: &str = "designs/first_display.md";
 
 /// A folder with the repository's scripts, designs and shapes.
@@ -47,16 +49,38 @@ fn tool(script: &str) -> Option<Tool> {
 fn lasting(text: &str) -> Vec<&str> {
     text.lines()
         .map(str::trim_end)
-        .filter(|line| !line.starts_with("  step ") && !line.starts_with("  written to "))
+        .filter(|line| {
+            !["  step ", "  written to ", "  took "]
+                .iter()
+                .any(|own| line.starts_with(own))
+        })
         .collect()
 }
 
-/// Runs the blocks that need nothing or `with`, in order, and compares what they print.
+/// Runs the tutorial's blocks that need nothing or `with`.
 fn tutorial(with: Option<Tool>) {
+    let (place, files, commands, with_tool, outputs) = run(TUTORIAL, with);
+    assert_eq!(files, 6);
+    assert!(commands >= 4 && outputs >= 4, "{commands} {outputs}");
+    assert!(with.is_none() || with_tool > 0, "no block needs the tool");
+    if place.path("table.csv").exists() {
+        the_row_of_a_position(&place.text("table.csv"));
+    }
+}
+
+fn the_better_display_is_found_as_shown() {
+    let (place, files, commands, _, outputs) = run(BETTER, None);
+    assert_eq!((files, commands, outputs), (1, 5, 3));
+    assert!(place.text("trade.csv").starts_with("quantity,value,gain,"));
+}
+
+/// Runs the blocks of a page that need nothing or `with`, in order, and compares what they print; how many
+/// files were written, commands run, of these with the tool, and outputs compared.
+fn run(name: &str, with: Option<Tool>) -> (Place, usize, usize, usize, usize) {
     let place = place();
     let mut printed: Option<String> = None;
     let (mut files, mut commands, mut with_tool, mut outputs) = (0, 0, 0, 0);
-    for block in blocks(&page(TUTORIAL)) {
+    for block in blocks(&page(name)) {
         match block.language.as_str() {
             "sh" => {
                 printed = None;
@@ -83,12 +107,7 @@ fn tutorial(with: Option<Tool>) {
             }
         }
     }
-    assert_eq!(files, 6);
-    assert!(commands >= 4 && outputs >= 4, "{commands} {outputs}");
-    assert!(with.is_none() || with_tool > 0, "no block needs the tool");
-    if place.path("table.csv").exists() {
-        the_row_of_a_position(&place.text("table.csv"));
-    }
+    (place, files, commands, with_tool, outputs)
 }
 
 fn the_tutorial_runs_and_prints_what_it_shows() {

@@ -3,6 +3,7 @@
 mod air_coil;
 mod bh_curve;
 mod core_field;
+mod iron;
 mod magnet;
 mod passive;
 mod saturated;

@@ -163,7 +163,7 @@ fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
         }
         let mut child = Command::new("python3")
             .args(["-c", PYTHON])
-            .arg(root().join("scripts"))
+            .arg(root().join("src/python/fluxform"))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

@@ -19,7 +19,7 @@ struct Problem {
 struct Exhaustive {
     /// The largest force in the wanted direction.
     most_n: f64,
-    /// The least power that gives the wanted force.
+    /// The least power that gives the requested force.
     power_w: Option<f64>,
 }
 

@@ -264,8 +264,8 @@ fn names(made: &Snapshot) -> Vec<Name> {
             "plots",
             "plots/mine.svg",
             "map.csv",
-            ".fluxform-kept",
-            ".fluxform-kept/mine",
+            ".fluxform-cache",
+            ".fluxform-cache/mine",
         ] {
             add(format!("{folder}/{name}"), Role::Other);
         }

@@ -113,7 +113,7 @@ fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &s
     // Output of an earlier run is replaced by a run that is not refused; the cache goes when it
     // is of no use any more.
     if laid.ours.contains(path) {
-        return !case.refused || path.contains("/.fluxform-kept");
+        return !case.refused || path.contains("/.fluxform-cache");
     }
     if case.refused {
         return false;
@@ -147,7 +147,7 @@ fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &s
 fn is_made_again(path: &str) -> bool {
     let name = path.rsplit('/').next().unwrap_or(path);
     (name.starts_with("timing") && name.ends_with(".json"))
-        || path.contains("/.fluxform-kept/")
+        || path.contains("/.fluxform-cache/")
         || path.contains("/points/")
 }
 

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    fluxform::cli::shell::main::<fluxform_bench::arguments::Arguments>(std::env::args_os())
+    fluxform::cli::shell::main::<fluxform_bench::arguments::Arguments>(std::env::args_os()).into()
 }

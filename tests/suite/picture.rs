@@ -14,11 +14,12 @@ pub fn picture(stage: &StageCurves) -> CurvesPlot {
             .iter()
             .map(|row| (row.seconds, row.error))
             .collect(),
-        defaults: (0..curve.rows.len())
+        marked: (0..curve.rows.len())
             .filter(|k| curve.rows[*k].default)
             .collect(),
     };
     CurvesPlot {
+        mark: "default",
         title: format!("{}: error against processor time", stage.stage),
         across: "processor time / s".to_owned(),
         up: unit_of(&stage.error_of),

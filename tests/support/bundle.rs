@@ -187,6 +187,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         working_point: None,
         given_force: None,
         sideways: None,
+        uncertainty: None,
         accuracy: accuracy.clone(),
     };
     let manifest = Manifest {

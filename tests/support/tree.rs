@@ -62,7 +62,7 @@ pub fn assert_no_leftovers(folder: &Path) {
 #[must_use]
 pub fn agree(name: &str, one: &[u8], other: &[u8]) -> bool {
     const OWN: std::ops::Range<usize> = 8..40;
-    if !name.contains(".fluxform-kept/") || one.len().min(other.len()) < OWN.end {
+    if !name.contains(".fluxform-cache/") || one.len().min(other.len()) < OWN.end {
         return one == other;
     }
     one[..OWN.start] == other[..OWN.start] && one[OWN.end..] == other[OWN.end..]

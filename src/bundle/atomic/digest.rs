@@ -35,12 +35,33 @@ pub(super) fn fill(
     durability: Durability,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<Written> {
+    let (bytes, sha256) = pour(file, durability, Some(Sha256::new()), content)?;
+    Ok(Written {
+        bytes,
+        sha256: sha256.map_or_else(String::new, |sha256| hex(&sha256.finalize())),
+    })
+}
+
+/// As [`fill`], for what carries a digest of its own.
+pub(super) fn fill_unhashed(
+    file: &mut File,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    pour(file, Durability::Cached, None, content).map(|_| ())
+}
+
+fn pour(
+    file: &mut File,
+    durability: Durability,
+    sha256: Option<Sha256>,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<(u64, Option<Sha256>)> {
     let mut buffered = BufWriter::with_capacity(
         BUFFER_BYTES,
         Hashing {
             file,
             durability,
-            sha256: Sha256::new(),
+            sha256,
             bytes: 0,
             unforced: 0,
         },
@@ -56,10 +77,7 @@ pub(super) fn fill(
             return Err(error);
         }
     };
-    Ok(Written {
-        bytes: hashing.bytes,
-        sha256: hex(&hashing.sha256.finalize()),
-    })
+    Ok((hashing.bytes, hashing.sha256))
 }
 
 /// Lower-case hexadecimal digits.
@@ -75,7 +93,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 struct Hashing<'a> {
     file: &'a mut File,
     durability: Durability,
-    sha256: Sha256,
+    sha256: Option<Sha256>,
     bytes: u64,
     /// Bytes since the last that were forced to the disk.
     unforced: u64,
@@ -86,7 +104,9 @@ impl Write for Hashing<'_> {
         // An incomplete file is temporary, and is removed as it is dropped.
         fluxform_base::progress::poll();
         let count = self.file.write(&buffer[..buffer.len().min(BUFFER_BYTES)])?;
-        self.sha256.update(&buffer[..count]);
+        if let Some(sha256) = &mut self.sha256 {
+            sha256.update(&buffer[..count]);
+        }
         self.bytes += count as u64;
         self.unforced += count as u64;
         if self.durability == Durability::Forced && self.unforced >= UNFORCED_BYTES {

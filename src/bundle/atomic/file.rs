@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::{Durability, Written, fill};
+use super::digest::{Durability, Written, fill, fill_unhashed};
 use super::dir::{Dir, EntryStatus, Kind};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
@@ -67,7 +67,7 @@ pub(crate) fn put(
     }
     let mut made = new_temporary(dir, earlier)?;
     // Small: one call at the end forces it.
-    fill(&mut made.file, Durability::Cached, content)?;
+    fill_unhashed(&mut made.file, content)?;
     finish(&made, earlier)?;
     if forced {
         made.file.sync_all()?;

@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         add(LimitName::FixedInner, fixed.inner_diameter_m);
         add(LimitName::FixedOuter, fixed.outer_diameter_m);
         add(LimitName::FixedLength, fixed.length_m);
-        for limit in &LIMITS {
+        for limit in LIMITS.iter().filter(|limit| !limit.of_array) {
             // A least bore of zero is the axis.
             let (name, set) = match limit.name {
                 LimitName::InnerDiameter => (limit.name, task.bore_min_m(&strand)),
@@ -305,6 +305,11 @@ impl<'a> Problem<'a> {
                 LimitName::CoreField => response.core_field_t.along(current),
                 LimitName::Voltage => product(current, resistance),
                 LimitName::Current => current,
+                // Never among the bounds: one coil does not decide them.
+                LimitName::Footprint
+                | LimitName::ArrayPower
+                | LimitName::ArrayMass
+                | LimitName::ArraySettling => along(f64::NAN, [0.0; 3]),
             })
             .collect();
         Some(Rated {

@@ -116,7 +116,7 @@ pub(super) fn solve_all<'a>(
                 && force_n > best_n
             {
                 best_n = force_n;
-                progress.improved(force_n);
+                progress.improved(force_n, "N");
             }
         }
         progress.end();

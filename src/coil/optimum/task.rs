@@ -5,7 +5,7 @@ use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::model::{CoilModel, Strand, Window};
 use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
-use fluxform_design::{Coil, Core, Design, Steel};
+use fluxform_design::{Coil, Core, Design, Driver, Steel};
 use fluxform_field::magnet::MagnetRule;
 
 /// Problems that cannot be optimised.
@@ -49,8 +49,14 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     {
         return Err(NoTask::NoVoltage);
     }
+    let mut limits = design.limits;
+    match design.supply.driver {
+        Driver::Voltage => {}
+        // A loop is faster than five time constants; `evaluate` checks what it reaches.
+        Driver::Current => limits.settling_max_s = None,
+    }
     Ok(Task {
-        limits: design.limits,
+        limits,
         fixed,
         pitch_m: nearest_m(&design.array.positions_m),
         bobbin: false,

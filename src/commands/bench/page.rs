@@ -56,7 +56,7 @@ fn picture(shape: &ShapeBench, shown: &Shown) -> CurvesPlot {
             points: (curve.runs.iter())
                 .filter_map(|(_, run)| Some((run.cpu_s, (shown.of)(run)?)))
                 .collect(),
-            defaults: Vec::new(),
+            marked: Vec::new(),
         })
         .collect();
     let present = shape.present();
@@ -64,10 +64,11 @@ fn picture(shape: &ShapeBench, shown: &Shown) -> CurvesPlot {
         Some(Line {
             name: "present settings".to_owned(),
             points: vec![(run.cpu_s, (shown.of)(run)?)],
-            defaults: vec![0],
+            marked: vec![0],
         })
     }));
     CurvesPlot {
+        mark: "default",
         title: format!("{}: error against processor time", shape.shape),
         across: "processor time / s".to_owned(),
         up: shown.label.to_owned(),

@@ -13,7 +13,9 @@ use super::plan::{Cost, Done, Plan, plan};
 use super::run;
 use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
-use crate::cli::args::{ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
+use crate::cli::args::{
+    ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag, Writing,
+};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -70,7 +72,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
     /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
-    /// OUT/<design>/.fluxform-kept
+    /// OUT/<design>/.fluxform-cache
     #[arg(long, hide_short_help = true)]
     no_cache: bool,
     /// Report the plan and its cost first
@@ -85,6 +87,8 @@ pub struct Calibrate {
     criterion: CriterionFlags,
     #[command(flatten)]
     requested: ForceFlags,
+    #[command(flatten)]
+    uncertain: UncertaintyFlags,
     #[command(flatten)]
     error: ErrorFlags,
     #[command(flatten)]
@@ -106,6 +110,7 @@ impl Calibrate {
         let out = folder(&self.out)?;
         let lambda = LambdaOptions {
             force: self.requested.into(),
+            uncertainty: self.uncertain.into(),
             weights: self.weights.weights,
             error: self.error.target(),
             ..self.criterion.options(self.tolerance.tolerance)
@@ -271,9 +276,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             file.criterion.described(&percent(file.jnd))
         ),
     );
-    sheet.line("given", &given(report));
-    sheet.line("computed", &force_errors(report));
-    sheet.line("sideways", &sideways(report));
+    force_lines(&mut sheet, report);
     sheet.line("accuracy", &accuracies(report));
     if let Some(steel) = working_points(report) {
         sheet.line("steel", &steel);
@@ -302,7 +305,49 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             bytes(total)
         ),
     );
+    let felt = of_shapes(report, |file| {
+        Some(describe::felt(file.headline.as_ref()?.felt.as_ref()?))
+    });
+    if !felt.is_empty() {
+        sheet.line("finger", &felt.join("\n"));
+    }
     sheet.finish()
+}
+
+/// The force of every shape: how much is given, what the computation adds, where it points, what is uncertain.
+fn force_lines(sheet: &mut Sheet, report: &CalibrateReport) {
+    let given = of_shapes(report, |file| {
+        Some(describe::given_force(file.headline.as_ref()?))
+    });
+    sheet.line("given", &given.join("\n"));
+    let errors = of_shapes(report, |file| {
+        Some(describe::force_error(file.headline.as_ref()?))
+    });
+    sheet.line("computed", &errors.join("\n"));
+    sheet.line("sideways", &sideways(report));
+    let uncertain = of_shapes(report, |file| {
+        file.uncertainty.as_ref().map(describe::uncertainty)
+    });
+    if !uncertain.is_empty() {
+        sheet.line("uncertain", &uncertain.join("\n"));
+    }
+}
+
+/// The lines of every shape, each beginning with its name.
+fn of_shapes(
+    report: &CalibrateReport,
+    text: impl Fn(&LambdaFile) -> Option<String>,
+) -> Vec<String> {
+    let files = report.bundles.iter().map(|bundle| &bundle.lambda.file);
+    files
+        .filter_map(|file| {
+            Some(format!(
+                "{}: {}",
+                file.shape,
+                text(file)?.replace('\n', "\n  ")
+            ))
+        })
+        .collect()
 }
 
 /// A line about every shape stands for itself; others begin with their shape.
@@ -401,26 +446,6 @@ fn working_points(report: &CalibrateReport) -> Option<String> {
             )
         )
     })
-}
-
-/// How much of the requested force the static currents of every shape give.
-fn given(report: &CalibrateReport) -> String {
-    let lines = report.bundles.iter().filter_map(|bundle| {
-        let file = &bundle.lambda.file;
-        let given = describe::given_force(file.headline.as_ref()?);
-        Some(format!("{}: {}", file.shape, given.replace('\n', "\n  ")))
-    });
-    lines.collect::<Vec<_>>().join("\n")
-}
-
-/// What the computation of every shape adds to the force.
-fn force_errors(report: &CalibrateReport) -> String {
-    let lines = report.bundles.iter().filter_map(|bundle| {
-        let file = &bundle.lambda.file;
-        let error = describe::force_error(file.headline.as_ref()?);
-        Some(format!("{}: {}", file.shape, error.replace('\n', "\n  ")))
-    });
-    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// The sideways force that the static currents of every shape leave, and feedback.

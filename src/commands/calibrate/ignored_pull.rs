@@ -24,15 +24,15 @@ pub(crate) enum IgnoredPull {
 pub(crate) struct Measured {
     /// The largest of its vertical force at a point, N.
     largest_n: f64,
-    /// The largest wanted force, N; 0 where there is no force constant.
+    /// The largest requested force, N; 0 where there is no force constant.
     wanted_n: f64,
     /// Whether coupled cores were taken one by one, being many.
     one_by_one: bool,
-    /// Where its share of the wanted force is largest; `None` where no force is wanted.
+    /// Where its share of the requested force is largest; `None` where no force is wanted.
     weakest: Option<Share>,
 }
 
-/// The pull against the wanted force.
+/// The pull against the requested force.
 #[derive(Clone, Copy)]
 struct Share {
     share: f64,
@@ -111,8 +111,8 @@ impl Measured {
     fn size(&self) -> String {
         let share = self.weakest.map_or_else(String::new, |at| {
             format!(
-                ", up to {} of the wanted force ({} at point {}); the cost is relative to \
-                 the largest wanted force",
+                ", up to {} of the requested force ({} at point {}); the cost is relative to \
+                 the largest requested force",
                 percent(at.share),
                 millinewtons(at.pull_n),
                 at.point
@@ -124,7 +124,7 @@ impl Measured {
         )
     }
 
-    /// Relative to the largest wanted force.
+    /// Relative to the largest requested force.
     fn cost(&self) -> f64 {
         if self.wanted_n > 0.0 {
             self.largest_n / self.wanted_n
@@ -164,7 +164,7 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The bundle once said nothing of a pull of half the wanted force.
+    /// The bundle once said nothing of a pull of half the requested force.
     #[test]
     fn a_pull_that_is_left_out_is_named_with_its_size() {
         let pull = IgnoredPull::Measured(Measured::new(&[-0.013, -0.0275], 0.9, &[0.07, 0.031]));

@@ -26,6 +26,7 @@ use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
+use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::Settings;
 use crate::map::FieldMap;
@@ -51,7 +52,7 @@ mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
-mod requested_force;
+pub(crate) mod requested_force;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -133,6 +134,9 @@ impl CalibrateOptions {
             feedback: _,
             picture: _,
             force,
+            // Of `lambda --feedback` alone.
+            direction_jnd_deg: _,
+            uncertainty,
         } = lambda;
         let Settings {
             criterion,
@@ -147,6 +151,7 @@ impl CalibrateOptions {
             force_direction: force.direction,
             normal_force: force.normal_force,
             weights: *weights,
+            uncertainty: *uncertainty,
             error: error.map(|target| target.error),
             refine: error.is_some_and(|target| target.refine),
             reach_m: *reach_m,
@@ -215,6 +220,7 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
+    check_reach(source.design, options)?;
     let tolerance = options.lambda.tolerance_for(source.design);
     let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
@@ -255,6 +261,22 @@ pub fn run(
         plan: None,
         bundles,
     })
+}
+
+/// # Errors
+/// A position that may be farther off than the map reaches.
+fn check_reach(design: &Design, options: &CalibrateOptions) -> Result<(), RunError> {
+    let sensor_m = options.lambda.uncertainty.over(design.uncertainty).sensor_m;
+    if sensor_m <= options.reach_m {
+        return Ok(());
+    }
+    Err(RunError::Input(format!(
+        "a sensor error of {} mm is larger than the map's reach of {} mm: give --reach {}mm or more, or lower \
+         --sensor-error (sensor_mm in [uncertainty])",
+        1e3 * sensor_m,
+        1e3 * options.reach_m,
+        1e3 * sensor_m
+    )))
 }
 
 /// # Errors
@@ -449,7 +471,7 @@ impl Calibration<'_> {
             &solved.forces,
             field,
             &of_grid,
-            &options.wiring,
+            (&options, self.force()),
             progress,
         )?;
         let grid_points = &points.discretized.points;

@@ -62,6 +62,7 @@ fn limit_checks(
         power_w: circuit.power_w(scene.rated_current_a()),
         mass_kg: circuit.wire_mass_kg + steel_kg,
         core_field_t: peak_t,
+        array_inductance_h: Some(circuit.inductance_h),
     });
     let limited = scene.design.limits.core_field_max_t.is_some() && scene.core.is_some();
     let unchecked = (limited && peak_t.is_none()).then_some("core field");

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{Evaluation, Transient, evaluate};
+use super::{Evaluation, LimitedBy, Transient, evaluate};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
 use crate::cli::budget::{CostOrigin, allow};
@@ -193,6 +193,19 @@ fn steel_core(core: &CoreSummary, target: &TargetSummary) -> String {
 /// After a voltage step.
 fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
     let relative = stage.map_or(0.0, |stage| stage.estimate);
+    if let Some(eddies_s) = transient.eddies_95_s {
+        return format!(
+            "by the current loop 95 % of the current after {}, of the force {} later; limited by {}",
+            si(transient.current_95_s, "s"),
+            si_with_error(eddies_s, relative, "s"),
+            match transient.limited_by {
+                LimitedBy::TimeConstant => "the coil's time constant",
+                LimitedBy::Voltage => "the supply's voltage",
+                LimitedBy::Bandwidth => "the loop's bandwidth",
+                LimitedBy::Eddies => "eddy currents in the core",
+            }
+        );
+    }
     format!(
         "with eddy currents in the steel 95 % of the current after {}, of the force after {}",
         si_with_error(transient.current_95_s, relative, "s"),

@@ -9,8 +9,9 @@ use serde::Serialize;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::coil::circuit::Circuit;
 use crate::coil::limits::LimitCheck;
-use crate::coil::transient::{VoltageStep, core_energy_share};
+use crate::coil::transient::{LEFT, VoltageStep, core_energy_share};
 use crate::design::Design;
 use crate::scene::Scene;
 use crate::scene::neighbours::{self, ArraySummary};
@@ -62,8 +63,27 @@ pub struct Evaluation {
 pub struct Transient {
     /// Time until the current reaches 95 % of its final value, s.
     pub current_95_s: f64,
-    /// Time until the force does, s.
+    /// Time until the force does, s; under a current loop the sum of the loop's and the eddies'.
     pub force_95_s: f64,
+    /// Under a current loop: time until the force follows a current that is there at once, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eddies_95_s: Option<f64>,
+    /// What takes most of it.
+    pub limited_by: LimitedBy,
+}
+
+/// What limits the speed of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitedBy {
+    /// Resistance and inductance under a voltage that is set.
+    TimeConstant,
+    /// The supply's voltage against the inductance.
+    Voltage,
+    /// The current loop.
+    Bandwidth,
+    /// Eddy currents in the core.
+    Eddies,
 }
 
 impl Evaluation {
@@ -86,6 +106,10 @@ pub fn evaluate(
     let scene = Scene::with_tolerance(design, tolerance)?;
     let mut rated = Rated::new(&scene)?;
     let array = neighbours::array(&scene, &mut rated.accuracy, &mut rated.warnings)?;
+    if let Some(array) = &array {
+        let own_h = array.coils.iter().map(|coil| coil.inductance_h);
+        rated.check_limits(&scene, Some(own_h.fold(0.0, f64::max)));
+    }
     let of_array = array.iter().flat_map(|array| &array.accuracy_missed);
     rated.accuracy_missed.extend(of_array.cloned());
     let transient = transient(&scene, &mut rated);
@@ -120,7 +144,7 @@ fn transient(scene: &Scene, rated: &mut Rated) -> Option<Transient> {
         air_inductance_h,
         inductance_h: rated.coil.circuit.inductance_h,
         relative_permeability: rated.relative_permeability,
-        conductivity_s_per_m: core.conductivity_s_per_m,
+        conductivity_s_per_m: core.conductivity_s_per_m(),
         core_radius_m: shape.radius_m,
         core_energy_share: core_energy_share(
             &scene.winding,
@@ -134,8 +158,37 @@ fn transient(scene: &Scene, rated: &mut Rated) -> Option<Transient> {
     let settling = step.settling().ok()?;
     let stage = settling.accuracy.clone();
     rated.accuracy.insert("transient", stage);
+    let (supply, current_a) = (&scene.design.supply, rated.target.current_a);
+    let circuit = Circuit {
+        inductance_h: rated.coil.circuit.inductance_h,
+        ..scene.circuit
+    };
+    let Some(current_95_s) = circuit.step_s(supply, current_a, LEFT) else {
+        let eddies = settling.force_95_s > 2.0 * settling.current_95_s;
+        return Some(Transient {
+            current_95_s: settling.current_95_s,
+            force_95_s: settling.force_95_s,
+            eddies_95_s: None,
+            limited_by: if eddies {
+                LimitedBy::Eddies
+            } else {
+                LimitedBy::TimeConstant
+            },
+        });
+    };
+    let eddies_95_s = step.eddies_95_s().ok()?;
+    let loop_alone_s = -LEFT.ln() / (std::f64::consts::TAU * supply.bandwidth_hz);
+    let limited_by = if eddies_95_s > current_95_s {
+        LimitedBy::Eddies
+    } else if current_95_s > 2.0 * loop_alone_s {
+        LimitedBy::Voltage
+    } else {
+        LimitedBy::Bandwidth
+    };
     Some(Transient {
-        current_95_s: settling.current_95_s,
-        force_95_s: settling.force_95_s,
+        current_95_s,
+        force_95_s: current_95_s + eddies_95_s,
+        eddies_95_s: Some(eddies_95_s),
+        limited_by,
     })
 }

@@ -9,7 +9,8 @@ use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
 use crate::cli::args::{
-    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing,
+    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag,
+    Writing,
 };
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
@@ -61,6 +62,8 @@ pub struct Lambda {
     feedback: FeedbackFlags,
     #[command(flatten)]
     requested: ForceFlags,
+    #[command(flatten)]
+    uncertain: UncertaintyFlags,
     /// Draw error and currents over lambda, the errors over the surface and force against wanted
     /// force (SVG); `-` for standard output
     #[arg(long, value_name = "FILE")]
@@ -113,6 +116,11 @@ struct FeedbackFlags {
     #[arg(long, hide_short_help = true, value_name = "LENGTH", requires = "feedback",
           value_parser = values::length_with_unit, allow_hyphen_values = true)]
     shell: Option<f64>,
+    /// With --feedback: pairs of points under two fingers so far apart, like 50mm,80mm: where both get their
+    /// force
+    #[arg(long, hide_short_help = true, value_name = "FROM,TO", requires = "feedback",
+          value_parser = values::distances, allow_hyphen_values = true)]
+    two_fingers: Option<values::Ends>,
 }
 
 /// How the force constant is chosen.
@@ -126,6 +134,11 @@ pub struct CriterionFlags {
     #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,
+    /// Angle between forces that a finger just notices, like 25deg: how static currents for a force vector
+    /// weigh sideways errors [default: the shape file's `direction_jnd_deg`, or 25]
+    #[arg(long, hide_short_help = true, value_name = "ANGLE", value_parser = values::direction_jnd,
+          allow_hyphen_values = true)]
+    direction_jnd: Option<f64>,
     /// Report currents and errors at this force constant too, N/m
     #[arg(long, hide_short_help = true, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
@@ -143,6 +156,7 @@ impl CriterionFlags {
                 at_n_per_m: self.at,
             },
             tolerance,
+            direction_jnd_deg: self.direction_jnd,
             ..LambdaOptions::default()
         }
     }
@@ -165,9 +179,11 @@ impl Lambda {
             variants: self.wiring.variants,
             feedback: self.feedback.feedback.then_some(FeedbackOptions {
                 shell_m: self.feedback.shell,
+                two_fingers_m: self.feedback.two_fingers.map(|ends| ends.0),
             }),
             picture: self.plot.is_some(),
             force: self.requested.into(),
+            uncertainty: self.uncertain.into(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(

@@ -13,6 +13,7 @@ mod points_effect;
 mod result_file;
 pub(crate) mod sideways;
 mod text;
+mod uncertain;
 mod variants;
 mod warnings;
 mod working_point;
@@ -49,6 +50,7 @@ use crate::scene::sources::Sampling;
 use crate::scene::steel;
 use crate::scene::steel::Solved;
 use crate::shape::document::ShapeDocument;
+use crate::uncertainty::UncertaintyOverride;
 
 /// Forces change over about the height above the coils: so many patches resolve them.
 const PATCHES_A_HEIGHT: f64 = 16.0;
@@ -76,6 +78,10 @@ pub struct LambdaOptions {
     pub picture: bool,
     /// What takes the place of the requested force that the shape states.
     pub force: ForceOverride,
+    /// What takes the place of the just-noticeable angle that the shape states, degrees.
+    pub direction_jnd_deg: Option<f64>,
+    /// What takes the place of the design's uncertainties.
+    pub uncertainty: UncertaintyOverride,
 }
 
 /// The force constant of one object. Serialised it is the JSON result.
@@ -113,6 +119,7 @@ impl LambdaOptions {
     fn over(&self, document: &ShapeDocument) -> Self {
         Self {
             force: self.force.over(document.force).into(),
+            direction_jnd_deg: self.direction_jnd_deg.or(Some(document.direction_jnd_deg)),
             ..self.clone()
         }
     }
@@ -211,7 +218,7 @@ pub fn run(
             &solved,
             none,
             points,
-            &options.wiring,
+            (options, options.force.over(RequestedForce::default())),
             progress,
         )?;
         let placed = Placed {

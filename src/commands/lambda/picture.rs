@@ -86,7 +86,7 @@ impl PosedProblem<'_> {
     fn chosen_forces(&self, solution: &Solution, feedback_n: Vec<f64>) -> Option<ChosenForces> {
         let (problem, at) = (&self.problem, solution.chosen.as_ref()?);
         let lambda_n_per_m = at.lambda_n_per_m;
-        let wanted_n: Vec<f64> = problem
+        let requested_n: Vec<f64> = problem
             .height_m
             .iter()
             .map(|h| lambda_n_per_m * h)
@@ -100,7 +100,7 @@ impl PosedProblem<'_> {
                 terms.fold(offset, |sum, (force, current)| sum + force * current)
             })
             .collect();
-        let errors = static_n.iter().zip(&wanted_n);
+        let errors = static_n.iter().zip(&requested_n);
         let errors_mn: Vec<f64> = errors
             .map(|(given, wanted)| (given - wanted) * 1e3)
             .collect();
@@ -132,7 +132,7 @@ impl PosedProblem<'_> {
         };
         Some(ChosenForces {
             lambda_n_per_m,
-            wanted_n,
+            requested_n,
             static_n,
             feedback_n,
             map,

@@ -100,7 +100,7 @@ impl WantedPoints {
     }
 
     /// The requested force over lambda times the height, at each point.
-    pub(super) fn directions(&self, force: RequestedForce) -> Vec<[f64; 3]> {
+    pub(crate) fn directions(&self, force: RequestedForce) -> Vec<[f64; 3]> {
         let normals = self.normals.iter().enumerate();
         let other = |row: usize| self.other_normals.get(row).copied().flatten();
         normals

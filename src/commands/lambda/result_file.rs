@@ -64,6 +64,7 @@ impl PosedProblem<'_> {
             working_point: None,
             given_force: chosen.and_then(|point| self.given(point, solution)),
             sideways: None,
+            uncertainty: None,
             headline: None,
             accuracy,
         };

@@ -1,10 +1,14 @@
-//! The sideways force at the chosen lambda, which the vertical problem does not see.
+//! The sideways force at the chosen lambda, which the vertical problem does not see, and the felt error of the
+//! force vector.
 
 use crate::RunError;
+use crate::bundle::headline::{FeltForce, FeltShares};
 use crate::bundle::lambda_file::LambdaFile;
+use crate::force_direction::RequestedForce;
+use crate::lambda::ForceProblem;
 use crate::lambda::feedback::FeedbackError;
 use crate::lambda::sideways::sideways;
-use crate::lambda::{ForceProblem, Wiring};
+use crate::lambda::vector_feedback::{CurrentsOf, VectorProblem, render_vectors};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -12,11 +16,12 @@ use crate::scene::passive;
 use crate::scene::steel::Solved;
 
 use super::points::WantedPoints;
+use super::{LambdaOptions, uncertain};
 
 /// Points looked at, at most: means and medians of a force that changes over centimetres.
 const MOST_POINTS: usize = 1000;
 
-/// Adds the sideways force of `file`'s currents and of feedback to it, if it has currents.
+/// Adds the study of what is uncertain, the sideways force of `file`'s currents and of feedback to it, if it has currents.
 ///
 /// # Errors
 /// Points that cannot be computed; interruption.
@@ -26,9 +31,10 @@ pub(crate) fn add(
     solved: &Solved,
     field: ShapeField,
     points: &WantedPoints,
-    wiring: &Wiring,
+    (options, force): (&LambdaOptions, RequestedForce),
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
+    uncertain::add(file, scene, solved, points, (options, force), progress)?;
     let (Some(currents_a), Some(lambda)) = (&file.currents_a, file.lambda_n_per_m) else {
         return Ok(());
     };
@@ -59,16 +65,41 @@ pub(crate) fn add(
         resistance_ohm: &resistance_ohm,
     };
     let wired = [&along_x, &along_y, &upward].map(|rows| {
-        wiring.apply(&ForceProblem {
+        options.wiring.apply(&ForceProblem {
             forces_n_per_a: rows,
             ..given
         })
     });
     let [of_x, of_y, of_z] = [0, 1, 2].map(|axis| wired[axis].problem(&given));
     let sides = [of_x.forces_n_per_a, of_y.forces_n_per_a];
-    file.sideways = sideways(&of_z, sides, lambda, currents_a).map_err(|error| match error {
+    let direction = points.directions(force);
+    let direction: Vec<[f64; 3]> = rows().map(|row| direction[row]).collect();
+    let vectors = VectorProblem {
+        upward: of_z,
+        sides_n_per_a: sides,
+        direction: &direction,
+    };
+    let followed = if force.direction.is_vector() {
+        CurrentsOf::Vector
+    } else {
+        CurrentsOf::Upward
+    };
+    let felt = |of| render_vectors(&vectors, lambda, of).map(|rendered| rendered.error_share);
+    let found = sideways(&of_z, sides, lambda, currents_a).and_then(|sideways| {
+        let exact = FeltShares {
+            fixed: felt(CurrentsOf::Static(currents_a))?,
+            feedback: felt(followed)?,
+            robust: None,
+        };
+        Ok((sideways, exact))
+    });
+    let (sideways, exact) = found.map_err(|error| match error {
         FeedbackError::Problem(problem) => RunError::from(problem),
         FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),
     })?;
+    file.sideways = sideways;
+    if let Some(headline) = &mut file.headline {
+        headline.add_felt(FeltForce::new(exact, file.uncertainty.as_ref()));
+    }
     Ok(())
 }

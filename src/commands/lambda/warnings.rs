@@ -73,9 +73,9 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
 fn of_status(status: Status) -> Option<&'static str> {
     match status {
         Status::Solved => None,
-        Status::NothingWanted => {
-            Some("every height is zero: no force is wanted, so no limit binds and lambda is null")
-        }
+        Status::NothingWanted => Some(
+            "every height is zero: no force is requested, so no limit binds and lambda is null",
+        ),
         Status::NothingRendered => Some(
             "no current within the limits pushes the magnet up at these points: lambda is null; \
              check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a and \

@@ -238,6 +238,42 @@ pub fn run(
     Ok(made.report(&scene, request, sidecar))
 }
 
+/// The maps of `design` in memory, nothing written.
+///
+/// # Errors
+/// A design that cannot be computed; interruption.
+pub fn tabulated(
+    design: &Design,
+    components: Components,
+    tolerance: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<SceneMap, RunError> {
+    let scene = Scene::with_tolerance(design, tolerance)?;
+    let grid = workspace_grid(design);
+    let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
+    let solved = solved(&scene, lowest_m, progress)?;
+    own_map(&scene, &solved, &grid, components, progress)
+}
+
+fn solved(scene: &Scene, lowest_m: f64, progress: &dyn Progress) -> Result<Solved, RunError> {
+    progress.begin("steel", 1);
+    let solved = steel::solve(scene, scene.tolerances.map, lowest_m)?;
+    progress.end();
+    Ok(solved)
+}
+
+/// The field itself over `grid`, of every coil.
+fn own_map(
+    scene: &Scene,
+    solved: &Solved,
+    grid: &Grid,
+    components: Components,
+    progress: &dyn Progress,
+) -> Result<SceneMap, RunError> {
+    let (coils, mean) = (&scene.coils, MagnetMean::field());
+    SceneMap::new(scene, solved, coils, grid, components, &mean, progress)
+}
+
 /// Everything that is computed for the files.
 struct Made {
     solved: Solved,
@@ -257,18 +293,8 @@ impl Made {
         let grid = workspace_grid(scene.design);
         let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
         let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
-        progress.begin("steel", 1);
-        let solved = steel::solve(scene, scene.tolerances.map, lowest_m)?;
-        progress.end();
-        let map = SceneMap::new(
-            scene,
-            &solved,
-            &scene.coils,
-            &grid,
-            request.components,
-            &MagnetMean::field(),
-            progress,
-        )?;
+        let solved = solved(scene, lowest_m, progress)?;
+        let map = own_map(scene, &solved, &grid, request.components, progress)?;
         let tabulated = (&grid, &map.map, lowest_m);
         let together = Together::new(scene, &solved, tabulated, request, progress)?;
         progress.check()?;

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::array::command::{ArrayFlags, Shared};
 use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::{Tolerance, Writing};
-use crate::cli::documents::{self, DesignDocument};
+use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
@@ -35,6 +36,8 @@ use crate::design::Need;
      "one that can be wound, as a design"),
     ("fluxform optimize designs/seed_air.toml --fix inner_diameter_mm --format json",
      "with the bore as it is, for a program"),
+    ("fluxform optimize designs/seed.toml --for shapes/flat.toml shapes/wedge.toml --vary array.pitch_mm=40:60",
+     "the array whose pitch is felt best over two shapes"),
 ]))]
 pub struct Optimize {
     /// Design file (TOML), `-` for standard input
@@ -48,8 +51,9 @@ pub struct Optimize {
     #[arg(long)]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
-    #[arg(long, hide_short_help = true, value_name = "N", default_value_t = 24, value_parser = starts)]
-    starts: usize,
+    /// [default: 24; with --for 3]
+    #[arg(long, hide_short_help = true, value_name = "N", value_parser = starts)]
+    starts: Option<usize>,
     /// Where the sequence of starting points begins
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -74,6 +78,8 @@ pub struct Optimize {
     writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
+    #[command(flatten)]
+    array: ArrayFlags,
 }
 
 /// A dimension that keeps the design's value.
@@ -103,8 +109,19 @@ impl Optimize {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        if !self.array.shapes.is_empty() {
+            let shared = Shared {
+                design: &self.design,
+                starts: self.starts,
+                seed: self.seed,
+                out: self.out.as_ref(),
+                force: self.writing.force,
+                tolerance: self.tolerance.tolerance,
+            };
+            return self.array.run(&shared, printer);
+        }
         let document = documents::design(&self.design, Need::OPTIMIZE, printer)?;
-        let mark = self.mark(&document);
+        let mark = mark(&self.design, &document.text);
         let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
         let inputs = vec![document.input.clone()];
         let overwrite =
@@ -174,21 +191,12 @@ impl Optimize {
             wound: self.wound,
             neighbours: self.neighbours,
             fixed: self.fix.iter().map(dimension).collect(),
-            starts: self.starts,
+            starts: self.starts.unwrap_or(OptimizeRequest::default().starts),
             seed: self.seed,
             cells: self.certificate_cells,
             around: true,
             tolerance: self.tolerance.tolerance,
         }
-    }
-
-    /// The line by which a design that was made of this one is known from any other file.
-    fn mark(&self, document: &DesignDocument) -> String {
-        format!(
-            "# Made of {} (sha256 {}) by `fluxform optimize`.",
-            self.design.as_given().display(),
-            sha256_hex(document.text.as_bytes())
-        )
     }
 
     /// Writes the best coil's design where it was requested; returns where the summary goes.
@@ -215,4 +223,13 @@ impl Optimize {
             }
         }
     }
+}
+
+/// The line by which a design that was made of this one is known from any other file.
+pub(super) fn mark(design: &FileArgument, text: &str) -> String {
+    format!(
+        "# Made of {} (sha256 {}) by `fluxform optimize`.",
+        design.as_given().display(),
+        sha256_hex(text.as_bytes())
+    )
 }

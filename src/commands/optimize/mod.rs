@@ -1,5 +1,6 @@
 //! `optimize`: the best coil within a design's limits (eq. 11).
 
+pub mod array;
 pub(crate) mod command;
 mod design_document;
 mod model;

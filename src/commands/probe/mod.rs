@@ -417,6 +417,19 @@ impl ProbeTable {
         &self.fields[point * self.coils + coil]
     }
 
+    /// Number of coils: rows of a point.
+    #[must_use]
+    pub fn coils(&self) -> usize {
+        self.coils
+    }
+
+    /// Force (N/A) and torque about the centre (N m/A) on the magnet, [point, coil]; empty where they
+    /// were not requested.
+    #[must_use]
+    pub fn forces(&self) -> &[[f64; 6]] {
+        &self.forces
+    }
+
     /// Writes the CSV table.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ const MOST_POSITIONS: f64 = 1e8;
 /// position it commands the currents of least power whose force on the magnet is lambda h(x, y),
 /// or the nearest force that the limits allow (equation 8). h is interpolated bilinearly between
 /// the bundle's points and is zero where there is no surface; outside the map nothing is commanded.
-/// The table states the wanted force, the force given and their difference, every coil's current,
+/// The table states the requested force, the force given and their difference, every coil's current,
 /// what the bundle's fixed currents would give instead, and whether a position was met (ok),
 /// beyond the limits (saturated) or outside the map. A position is held until the next one; with
 /// --dynamics its row states the end of that time.

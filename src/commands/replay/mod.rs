@@ -20,6 +20,8 @@ use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
+use crate::commands::calibrate::DESIGN_FILE;
+use crate::design::{Design, Driver, Need};
 use crate::progress::Progress;
 use renderer::{Renderer, RendererError, Step};
 use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
@@ -83,6 +85,16 @@ impl Opened {
         synthesis.trajectory(self.renderer.heights(), self.renderer.map())
     }
 
+    /// Bandwidth of the current loop that the bundle's design has, Hz.
+    fn bandwidth_hz(&self) -> Option<f64> {
+        let path = self.bundle.folder.join(DESIGN_FILE);
+        let (design, _) = Design::read(&path, Need::SWEEP).ok()?;
+        match design.supply.driver {
+            Driver::Voltage => None,
+            Driver::Current => Some(design.supply.bandwidth_hz),
+        }
+    }
+
     /// The circuit of the bundle's coils, without current.
     fn drive(&self) -> Result<Drive, RunError> {
         let name = self.bundle.folder.display();
@@ -136,6 +148,7 @@ pub fn run(
         )));
     }
     let mut drive = dynamics.then(|| opened.drive()).transpose()?;
+    let bandwidth_hz = opened.bandwidth_hz();
     let warnings = plausible::warnings(trajectory, &ends_m);
     progress.take_seconds();
     let coils = renderer.coils();
@@ -159,7 +172,7 @@ pub fn run(
         .map(|(_, seconds)| seconds / trajectory.len().max(1) as f64);
     let dynamics = drive
         .as_ref()
-        .map(|drive| DynamicsSummary::of(drive, &opened.bundle));
+        .map(|drive| DynamicsSummary::of(drive, &opened.bundle, bandwidth_hz));
     let mut follower = Follower {
         renderer,
         fixed_a: opened
@@ -169,6 +182,7 @@ pub fn run(
             .map(|row| row.current_a)
             .collect(),
         bounds: summary::Bounds::of(&opened.bundle),
+        bandwidth_hz,
     };
     let rows = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
     let summary = ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
@@ -186,6 +200,8 @@ struct Follower {
     /// The bundle's static currents.
     fixed_a: Vec<f64>,
     bounds: summary::Bounds,
+    /// That of the current loop, Hz, where the drivers close one.
+    bandwidth_hz: Option<f64>,
 }
 
 impl Follower {
@@ -219,7 +235,10 @@ impl Follower {
                 if row == 0 {
                     drive.settle(command);
                 }
-                drive.hold(command, held_s[row]);
+                match self.bandwidth_hz {
+                    None => drive.hold(command, held_s[row]),
+                    Some(bandwidth_hz) => drive.track(command, held_s[row], bandwidth_hz),
+                }
                 drive.currents(&mut flowing);
             }
             let per_ampere = self.renderer.force_n_per_a();

@@ -131,7 +131,7 @@ impl ReplayReport {
             position_m: &rows.position_m,
             surface_m: &rows.height_m,
             inside: rows.answer.iter().map(|a| *a != Answer::Outside).collect(),
-            wanted_n: &rows.wanted_force_n,
+            requested_n: &rows.wanted_force_n,
             given_n: &rows.force_n,
             static_n: &rows.static_force_n,
             coils: rows.coils,

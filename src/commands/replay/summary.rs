@@ -80,7 +80,7 @@ pub struct TrajectorySummary {
 /// Forces along a trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ForceSummary {
-    /// The largest force wanted, N.
+    /// The largest force requested, N.
     pub wanted_max_n: f64,
     /// With position feedback.
     pub feedback: ErrorSummary,
@@ -107,12 +107,12 @@ pub struct VectorErrors {
     pub direction_95_deg: f64,
 }
 
-/// Differences from the wanted force, over the positions inside the map.
+/// Differences from the requested force, over the positions inside the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorSummary {
     /// Root mean square, N.
     pub rms_error_n: f64,
-    /// The same over the wanted force's root mean square; null where none is wanted.
+    /// The same over the requested force's root mean square; null where none is wanted.
     pub relative_rms_error: Option<f64>,
     /// Largest size, N.
     pub worst_error_n: f64,
@@ -164,16 +164,20 @@ pub struct DynamicsSummary {
     pub time_constant_max_s: f64,
     /// The bound of the coils' voltages, V; null without one.
     pub voltage_v: Option<f64>,
+    /// Bandwidth of the current loop, Hz; absent where drivers set voltages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bandwidth_hz: Option<f64>,
 }
 
 impl DynamicsSummary {
-    pub(super) fn of(drive: &Drive, bundle: &Bundle) -> Self {
+    pub(super) fn of(drive: &Drive, bundle: &Bundle, bandwidth_hz: Option<f64>) -> Self {
         let [shortest, longest] = drive.time_constants_s().unwrap_or_default();
         let rendering = bundle.map.runtime.rendering.as_ref();
         Self {
             time_constant_min_s: shortest,
             time_constant_max_s: longest,
             voltage_v: rendering.and_then(|rendering| rendering.voltage_v),
+            bandwidth_hz,
         }
     }
 }

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::front::front;
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
@@ -15,6 +14,7 @@ use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
     MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
 };
+use crate::numerics::front::front;
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
 

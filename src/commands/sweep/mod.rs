@@ -5,11 +5,11 @@
 
 pub mod axis;
 pub(crate) mod command;
-pub mod front;
 pub mod merge;
 mod merge_command;
 pub mod plan;
 mod plan_command;
 mod point;
+pub(crate) use point::toml_value;
 pub mod run;
 mod run_command;

@@ -167,7 +167,7 @@ fn refusal(refused: &InvalidDocument) -> String {
 }
 
 /// The value as TOML. Whole numbers are integers: keys that count take them, all others too.
-pub(super) fn toml_value(value: &Value) -> toml::Value {
+pub(crate) fn toml_value(value: &Value) -> toml::Value {
     match value {
         Value::Flag(flag) => toml::Value::Boolean(*flag),
         Value::Number(number) if number.fract() == 0.0 && number.abs() < 1e15 => {

@@ -15,7 +15,7 @@ use crate::scene::evaluation_sample::spread;
 const LAMBDA_AGREES: f64 = 1e-8;
 /// How much a force constant may move with the stated error of steel's forces.
 const FORCES_MOVE: f64 = 10.0;
-/// Largest duality gap, relative to the mean square of the wanted force.
+/// Largest duality gap, relative to the mean square of the requested force.
 const GAP_ALLOWED: f64 = 1e-10;
 
 /// The force constant, the currents and their errors from forces computed again. `weights` are those

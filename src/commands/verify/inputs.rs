@@ -164,6 +164,7 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
                 direction: made.force_direction,
                 normal_force: made.normal_force,
             };
+            options.lambda.uncertainty = made.uncertainty;
         }
         // Older bundles do not name their options; what they hold states one of them.
         None => {
@@ -185,7 +186,8 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         && options
             .lambda
             .tolerance
-            .is_none_or(|t| TOLERANCES.contains(&t));
+            .is_none_or(|t| TOLERANCES.contains(&t))
+        && options.lambda.uncertainty.is_sound();
     sound
         .then_some(options)
         .ok_or_else(|| "the options that the bundle names are none that a run may have".to_owned())

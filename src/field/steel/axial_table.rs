@@ -103,7 +103,7 @@ impl AxialTable {
         })
     }
 
-    /// `wanted` at the points (`r_m`, `z_m`), `[quantity][point]`.
+    /// `requested` at the points (`r_m`, `z_m`), `[quantity][point]`.
     ///
     /// # Errors
     /// A point on the winding's edge.
@@ -114,16 +114,16 @@ impl AxialTable {
         &self,
         r_m: &[f64],
         z_m: &[f64],
-        wanted: &[Quantity],
+        requested: &[Quantity],
     ) -> Result<Vec<Vec<f64>>, OnEdge> {
         assert_eq!(r_m.len(), z_m.len(), "one height per radius");
-        let mut out = vec![Vec::with_capacity(r_m.len()); wanted.len()];
+        let mut out = vec![Vec::with_capacity(r_m.len()); requested.len()];
         let mut last: Option<(Key, Arc<Cell>)> = None;
         let mut room = [0.0; MOST_TERMS];
         for (r, z) in r_m.iter().zip(z_m) {
             let Some(place) = self.place(*r, *z) else {
                 let field = self.exact(*r, *z)?;
-                for (values, quantity) in out.iter_mut().zip(wanted) {
+                for (values, quantity) in out.iter_mut().zip(requested) {
                     values.push(quantity.of(&field));
                 }
                 continue;
@@ -134,7 +134,7 @@ impl AxialTable {
             };
             let (along_r, along_z) = (polynomials(place.x), polynomials(place.y));
             let rows = &mut room[..self.terms];
-            for (values, quantity) in out.iter_mut().zip(wanted) {
+            for (values, quantity) in out.iter_mut().zip(requested) {
                 values.push(dispatch::run(Series {
                     coefficients: self.series(place.key, cell, *quantity)?,
                     along_r: &along_r[..self.terms],
@@ -164,7 +164,7 @@ impl AxialTable {
         assert_eq!(out.len(), parts.count() * count);
         let r_m: Vec<f64> = points_m.iter().map(|[x, y, _]| x.hypot(*y)).collect();
         let z_m: Vec<f64> = points_m.iter().map(|p| p[2]).collect();
-        let wanted: &[Quantity] = match parts {
+        let requested: &[Quantity] = match parts {
             Components::Gz => {
                 let values = self.sample(&r_m, &z_m, &[Quantity::DbzDz])?;
                 out.copy_from_slice(&values[0]);
@@ -178,7 +178,7 @@ impl AxialTable {
                 Quantity::Bz,
             ],
         };
-        let values = self.sample(&r_m, &z_m, wanted)?;
+        let values = self.sample(&r_m, &z_m, requested)?;
         // Of the force those along z alone, the gradient's last.
         let first = if parts == Components::Force { 2 } else { 0 };
         for (place, [x, y, _]) in points_m.iter().enumerate() {
@@ -490,13 +490,13 @@ mod tests {
                 let axial = coil.field(r_m, point[2]).expect("off the edges");
                 let exact = to_cartesian(&axial, point[0], point[1]);
                 let (g, b) = (exact.gradient_t_per_m_per_a, exact.field_t_per_a);
-                let wanted = [
+                let requested = [
                     g[0][0], g[0][1], g[0][2], g[1][2], g[2][2], b[0], b[1], b[2],
                 ];
                 let sizes = [axial.gradient_norm(), axial.b_r.hypot(axial.b_z)];
-                for (component, wanted) in wanted.into_iter().enumerate() {
+                for (component, requested) in requested.into_iter().enumerate() {
                     let size = sizes[usize::from(component >= 5)];
-                    let error = (all[component * places.len() + place] - wanted).abs() / size;
+                    let error = (all[component * places.len() + place] - requested).abs() / size;
                     assert!(error < tolerance, "{point:?} {component}: {error:e}");
                 }
                 let alone = AxialTable::new(Some(winding), coil.core.clone(), tolerance);

@@ -421,6 +421,22 @@ impl ArraySources {
         task.sources(tolerance * fewer, &every, &layers)
     }
 
+    /// Dipoles given as such: places (m) with unit normals, and layer moments [dipole, drive].
+    pub(crate) fn of_dipoles(
+        drives: usize,
+        top_m: f64,
+        places: Vec<[f64; 6]>,
+        moments: Vec<f64>,
+    ) -> Self {
+        Self {
+            drives,
+            top_m,
+            places,
+            moments,
+            symmetry: Default::default(),
+        }
+    }
+
     /// Number of drives.
     #[must_use]
     pub fn drives(&self) -> usize {

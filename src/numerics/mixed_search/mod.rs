@@ -142,6 +142,10 @@ const FIRST: usize = 6;
 /// Width of the first trust region, of that of a descent in the same valley, and of the widest.
 const FIRST_WIDTH: f64 = 0.3;
 const WIDEST: f64 = 0.6;
+/// Width of the region in which a design is refined.
+const REFINED_WIDTH: f64 = 0.02;
+/// Places from which a design within the limits is looked for.
+const FEASIBLE_STARTS: usize = 12;
 /// What a region's width is multiplied by after success at its border, and after failure.
 const WIDER: f64 = 1.6;
 const NARROWER: f64 = 0.5;
@@ -227,17 +231,69 @@ impl<'a> Search<'a> {
             }
             self.evaluate(batch)?;
         }
-        for start in 0..self.settings.starts {
+        for start in self.ends.len()..self.settings.starts {
             if self.spent() {
                 break;
             }
             let Some(center) = self.start(start) else {
                 break;
             };
-            let end = self.descend(center)?;
+            let end = self.descend(center, FIRST_WIDTH)?;
+            if self.spent() {
+                break;
+            }
             self.ends.push(end);
         }
         Ok(())
+    }
+
+    /// Allows more evaluations: this many in all.
+    pub fn allow(&mut self, evaluations: usize) {
+        self.settings.evaluations = evaluations;
+    }
+
+    /// Descends once more from the best design, in a narrow region: what outputs mean has changed a
+    /// little.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub fn refine(&mut self) -> Result<(), Interrupted> {
+        let merits = self.samples.iter().enumerate();
+        let merits = merits.filter_map(|(index, s)| Some((self.judged(s)?, index)));
+        let best = merits.reduce(|a, b| if better(&b.0, &a.0) { b } else { a });
+        if let Some((_, center)) = best {
+            self.descend(center, REFINED_WIDTH)?;
+        }
+        Ok(())
+    }
+
+    /// The design that breaks those limits least that need no costly outputs, from `given` and from
+    /// the sequence's first places.
+    #[must_use]
+    pub fn least_broken(&self, given: &[f64]) -> (Vec<f64>, Judged) {
+        let variables = self.problem.variables();
+        let everywhere = (vec![0.0; given.len()], vec![1.0; given.len()]);
+        let of = |u: &[f64]| {
+            let judged = self.problem.judge(&self.values(u), &[]);
+            Judged {
+                objectives: vec![0.0],
+                ..judged
+            }
+        };
+        let mut random = Random::new(self.settings.seed);
+        let mut starts = vec![self.units(given), vec![0.5; given.len()]];
+        starts.extend((0..FEASIBLE_STARTS).map(|_| given.iter().map(|_| random.unit()).collect()));
+        let mut best = (given.to_vec(), of(&self.units(given)));
+        for start in starts {
+            if best.1.excess() <= MET {
+                break;
+            }
+            let ended = rounding::climb_whole(variables, &of, &start, &everywhere);
+            if let Some(ended) = ended.filter(|e| e.judged.excess() < best.1.excess()) {
+                best = (self.values(&ended.u), ended.judged);
+            }
+        }
+        best
     }
 
     fn spent(&self) -> bool {
@@ -267,8 +323,8 @@ impl<'a> Search<'a> {
     }
 
     /// Follows the surrogate from sample `center` until the trust region is as narrow as requested.
-    fn descend(&mut self, center: usize) -> Result<Vec<f64>, Interrupted> {
-        let (mut center, mut width) = (center, FIRST_WIDTH);
+    fn descend(&mut self, center: usize, width: f64) -> Result<Vec<f64>, Interrupted> {
+        let (mut center, mut width) = (center, width);
         while width > self.settings.finest && !self.spent() {
             let at = self.units(&self.samples[center].x);
             let Some(surrogate) = self.surrogate() else {

@@ -1,4 +1,4 @@
-//! Error against seconds: curves in a doubly logarithmic plane, the defaults marked.
+//! Error against seconds: curves in a doubly logarithmic plane, some points marked.
 
 use std::sync::Arc;
 
@@ -17,10 +17,10 @@ const PANEL_PX: [f64; 2] = [640.0, 440.0];
 const FLOOR: f64 = 1e-17;
 /// Marks, px.
 const DOT_PX: f64 = 3.5;
-const DEFAULT_PX: f64 = 8.0;
+const MARK_PX: f64 = 8.0;
 /// Most ticks of an axis.
 const MOST_TICKS: f64 = 9.0;
-const DEFAULT: &str = "#000000";
+const MARK: &str = "#000000";
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +29,8 @@ pub struct Line {
     pub name: String,
     /// Seconds and errors, in order.
     pub points: Vec<(f64, f64)>,
-    /// Which of them are defaults.
-    pub defaults: Vec<usize>,
+    /// Which of them have a ring.
+    pub marked: Vec<usize>,
 }
 
 /// Data of the drawing.
@@ -42,6 +42,8 @@ pub struct CurvesPlot {
     pub across: String,
     /// Name and unit of what is along y.
     pub up: String,
+    /// The meaning of a ring.
+    pub mark: &'static str,
     /// The curves; the first nine differ in colour.
     pub lines: Vec<Line>,
 }
@@ -57,11 +59,11 @@ impl CurvesPlot {
         let mut plots = Vec::new();
         for (k, line) in shown.iter().enumerate() {
             let colour = COLOURS[k % COLOURS.len()];
-            let defaults = line.defaults.iter().map(|at| line.points[*at]);
+            let marked = line.marked.iter().map(|at| line.points[*at]);
             let ring = ScatterPlot::new()
-                .with_data(defaults.collect::<Vec<_>>())
-                .with_color(DEFAULT)
-                .with_size(DEFAULT_PX);
+                .with_data(marked.collect::<Vec<_>>())
+                .with_color(MARK)
+                .with_size(MARK_PX);
             plots.push(Plot::Scatter(ring));
             let joined = LinePlot::new().with_data(line.points.clone());
             plots.push(Plot::Line(joined.with_color(colour)));
@@ -94,8 +96,8 @@ impl CurvesPlot {
         let mut entries: Vec<LegendEntry> = (self.lines.iter().enumerate())
             .map(|(k, line)| entry(&line.name, COLOURS[k % COLOURS.len()]))
             .collect();
-        if self.lines.iter().any(|line| !line.defaults.is_empty()) {
-            entries.push(entry("default", DEFAULT));
+        if self.lines.iter().any(|line| !line.marked.is_empty()) {
+            entries.push(entry(self.mark, MARK));
         }
         entries
     }
@@ -104,11 +106,11 @@ impl CurvesPlot {
 impl Line {
     /// Decimal logarithms of the points that have any; errors too small are drawn at the floor.
     fn drawable(&self) -> Self {
-        let (mut points, mut defaults) = (Vec::new(), Vec::new());
+        let (mut points, mut marked) = (Vec::new(), Vec::new());
         for (at, (x, y)) in self.points.iter().enumerate() {
             if *x > 0.0 && x.is_finite() && *y >= 0.0 && y.is_finite() {
-                if self.defaults.contains(&at) {
-                    defaults.push(points.len());
+                if self.marked.contains(&at) {
+                    marked.push(points.len());
                 }
                 points.push((x.log10(), y.max(FLOOR).log10()));
             }
@@ -116,7 +118,7 @@ impl Line {
         Self {
             name: self.name.clone(),
             points,
-            defaults,
+            marked,
         }
     }
 }
@@ -157,10 +159,11 @@ mod tests {
             title: "cored-coil".to_owned(),
             across: "processor time / s".to_owned(),
             up: "error, relative to |grad B|".to_owned(),
+            mark: "default",
             lines: vec![Line {
                 name: "fluxform: tolerance".to_owned(),
                 points: points.to_vec(),
-                defaults: (0..points.len().min(1)).collect(),
+                marked: (0..points.len().min(1)).collect(),
             }],
         }
     }

@@ -65,7 +65,7 @@ pub struct ChosenForces {
     /// N/m.
     pub lambda_n_per_m: f64,
     /// N.
-    pub wanted_n: Vec<f64>,
+    pub requested_n: Vec<f64>,
     /// With static currents, N.
     pub static_n: Vec<f64>,
     /// With position feedback, N; empty where it was not requested.
@@ -203,7 +203,7 @@ impl LambdaPlot {
         let Some(chosen) = &self.chosen else {
             return empty("no lambda is chosen: no errors");
         };
-        let title = |range: &str| format!("static: given - wanted{range} / mN");
+        let title = |range: &str| format!("static: given - requested{range} / mN");
         let (plot, x, y, title, bar) = match &chosen.map {
             ErrorMap::Grid { x_mm, y_mm, cells } => {
                 let (x, y) = (wide(*x_mm), wide(*y_mm));
@@ -257,15 +257,18 @@ impl LambdaPlot {
             return empty("no lambda is chosen: no forces");
         };
         let mn = |values: &[f64]| -> Vec<f64> { values.iter().map(|f| f * 1e3).collect() };
-        let wanted = mn(&chosen.wanted_n);
+        let requested = mn(&chosen.requested_n);
         let (fixed, following) = (mn(&chosen.static_n), mn(&chosen.feedback_n));
         let (x, y) = (
-            extent(&wanted),
-            extent(&[wanted.as_slice(), &fixed, &following].concat()),
+            extent(&requested),
+            extent(&[requested.as_slice(), &fixed, &following].concat()),
         );
         let dots = |given: &[f64], colour: &str, size: f64| {
-            let points: Vec<(f64, f64)> =
-                wanted.iter().copied().zip(given.iter().copied()).collect();
+            let points: Vec<(f64, f64)> = requested
+                .iter()
+                .copied()
+                .zip(given.iter().copied())
+                .collect();
             let dots = ScatterPlot::new().with_data(thinned(&points, x, y));
             Plot::Scatter(dots.with_color(colour).with_size(size))
         };
@@ -278,7 +281,7 @@ impl LambdaPlot {
         ];
         let layout = Layout::new(x, y)
             .with_title(format!("forces at {:.4} N/m", chosen.lambda_n_per_m))
-            .with_x_label("wanted / mN")
+            .with_x_label("requested / mN")
             .with_y_label("given / mN");
         (plots, layout)
     }
@@ -357,7 +360,7 @@ mod tests {
             ],
             chosen: Some(ChosenForces {
                 lambda_n_per_m: 1.9,
-                wanted_n: (0..points).map(|k| 0.1 + 1e-4 * k as f64).collect(),
+                requested_n: (0..points).map(|k| 0.1 + 1e-4 * k as f64).collect(),
                 static_n: errors.iter().map(|e| 0.1 + 0.01 * e).collect(),
                 feedback_n: Vec::new(),
                 map: ErrorMap::Grid {
@@ -381,7 +384,7 @@ mod tests {
             "linear 1.3000 N/m",
             "saturation 7.7000 N/m (not shown)",
             "relative to the rms force / %",
-            "given - wanted / mN",
+            "given - requested / mN",
             "coil 1",
         ] {
             assert!(svg.contains(words), "{words}");

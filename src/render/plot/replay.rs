@@ -21,7 +21,7 @@ const THICK: f64 = 2.4;
 /// Colours that stay apart for the colour-blind and in print.
 const FINGER: &str = "#0072b2";
 const SURFACE: &str = "#7f7f7f";
-const WANTED: &str = "#b5b5b5";
+const REQUESTED: &str = "#b5b5b5";
 const GIVEN: &str = "#0072b2";
 const FIXED: &str = "#d55e00";
 pub(super) const COILS: [&str; 9] = [
@@ -43,7 +43,7 @@ pub struct ReplayPlot<'a> {
     /// Whether the position lies inside the map.
     pub inside: Vec<bool>,
     /// N.
-    pub wanted_n: &'a [f64],
+    pub requested_n: &'a [f64],
     /// With feedback, N.
     pub given_n: &'a [f64],
     /// With fixed currents, N.
@@ -75,7 +75,7 @@ impl ReplayPlot<'_> {
             entry("finger", FINGER, LegendShape::Circle),
             entry("outside the map", FIXED, LegendShape::Circle),
             entry("surface below it", SURFACE, LegendShape::Line),
-            entry("force wanted", WANTED, LegendShape::Line),
+            entry("force requested", REQUESTED, LegendShape::Line),
             entry("force with feedback", GIVEN, LegendShape::Line),
             entry("force with fixed currents", FIXED, LegendShape::Line),
         ];
@@ -121,12 +121,12 @@ impl ReplayPlot<'_> {
 
     fn forces(&self) -> (Vec<Plot>, Layout) {
         let mn = |values: &[f64]| -> Vec<f64> { values.iter().map(|f| f * 1e3).collect() };
-        let (wanted, given, fixed) = (mn(self.wanted_n), mn(self.given_n), mn(self.static_n));
+        let (requested, given, fixed) = (mn(self.requested_n), mn(self.given_n), mn(self.static_n));
         let all = self.all();
-        let mut plots = self.lines(&wanted, &all, WANTED, 2.0 * THICK);
+        let mut plots = self.lines(&requested, &all, REQUESTED, 2.0 * THICK);
         plots.extend(self.lines(&fixed, &self.inside, FIXED, THIN));
         plots.extend(self.lines(&given, &all, GIVEN, THIN));
-        let values = wanted.iter().chain(&given).chain(&fixed).copied();
+        let values = requested.iter().chain(&given).chain(&fixed).copied();
         (
             plots,
             self.over_time(extent(values), "upward force", "F / mN"),
@@ -245,7 +245,7 @@ mod tests {
     fn drawn(count: usize) -> String {
         let t_s: Vec<f64> = (0..count).map(|k| 0.02 * k as f64).collect();
         let wave = |hz: f64| -> Vec<f64> { t_s.iter().map(|t| 0.3 * (hz * t).sin()).collect() };
-        let (wanted, given, fixed) = (wave(0.7), wave(1.3), wave(2.1));
+        let (requested, given, fixed) = (wave(0.7), wave(1.3), wave(2.1));
         let position_m: Vec<[f64; 3]> = t_s.iter().map(|t| [0.01 * t, 0.0, 0.05]).collect();
         let plot = ReplayPlot {
             title: "flat on a".to_owned(),
@@ -253,7 +253,7 @@ mod tests {
             position_m: &position_m,
             surface_m: &vec![0.05; count],
             inside: (0..count).map(|k| k % 50 < 40).collect(),
-            wanted_n: &wanted,
+            requested_n: &requested,
             given_n: &given,
             static_n: &fixed,
             coils: 2,

@@ -9,7 +9,7 @@ use super::data::{CalibratedObject, DrivenCoil};
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
-use super::{directions, error_budget, field, limits, path, surface};
+use super::{directions, error_budget, field, limits, path, surface, uncertainty};
 
 /// The page.
 #[must_use]
@@ -21,6 +21,7 @@ pub fn page(object: &CalibratedObject, files: &[&str]) -> String {
         Some(answer(object)),
         Some(surface::section(object, &mut data)),
         directions::section(object),
+        uncertainty::section(object),
         Some(error_budget::section(object)),
         Some(limits::section(object)),
         Some(path::section(object, &mut data)),

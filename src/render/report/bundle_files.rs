@@ -8,6 +8,7 @@ use super::bundle::page;
 use super::data::CalibratedObject;
 use super::directions;
 use super::field::{Plan, some, together};
+use super::uncertainty;
 use crate::plot::lambda::LambdaPlot;
 use crate::plot::plane::{Cells, Panel, PlanePlot, Together};
 
@@ -41,6 +42,11 @@ pub fn files(
         let drawing = directions::plot(object, field).svg();
         files.push(("plots/direction.svg", drawing.into_bytes()));
         files.push(("plots/direction.csv", directions::table(field)?));
+    }
+    if let Some(study) = &object.lambda.uncertainty {
+        let drawing = uncertainty::plot(object, study).svg();
+        files.push(("plots/uncertainty.svg", drawing.into_bytes()));
+        files.push(("plots/uncertainty.csv", uncertainty::table(study)?));
     }
     let names = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
     let names = names.iter().chain(others).copied();
@@ -82,7 +88,7 @@ fn errors_table(object: &CalibratedObject) -> io::Result<Option<Vec<u8>>> {
         &[
             ("x_m", Column::Number(&x_m)),
             ("y_m", Column::Number(&y_m)),
-            ("wanted_n", Column::Number(&forces.wanted_n)),
+            ("wanted_n", Column::Number(&forces.requested_n)),
             ("given_n", Column::Number(&forces.static_n)),
         ],
     )?;

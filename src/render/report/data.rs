@@ -73,12 +73,12 @@ impl CalibratedObject<'_> {
     #[must_use]
     pub fn worst_place(&self) -> Option<WorstPlace> {
         let forces = self.curves.chosen.as_ref()?;
-        let error = |at: usize| (forces.static_n[at] - forces.wanted_n[at]).abs();
+        let error = |at: usize| (forces.static_n[at] - forces.requested_n[at]).abs();
         let points = 0..self.points.len();
         let worst = points.reduce(|a, b| if error(b) > error(a) { b } else { a })?;
         Some(WorstPlace {
             position_m: self.position_m(worst),
-            wanted_n: forces.wanted_n[worst],
+            wanted_n: forces.requested_n[worst],
             given_n: forces.static_n[worst],
         })
     }

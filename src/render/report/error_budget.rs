@@ -6,7 +6,7 @@ use super::html::{Cell, Html, Table};
 use super::measured::MeasuredRow;
 use super::number::{figures, force, percent, si};
 use fluxform_base::accuracy::StageAccuracy;
-use fluxform_bundle::headline::{GivenForce, Headline};
+use fluxform_bundle::headline::{FeltShares, GivenForce, Headline};
 use serde_json::{Map, Value, json};
 
 /// A part of the error that a force gathers.
@@ -33,6 +33,7 @@ pub(super) fn section(object: &CalibratedObject) -> Section {
               <span class=\"swatch jnd\"></span>just noticeable; the bars' scale is logarithmic, \
               1e-16 at the left, the whole force at the right</p>",
     );
+    felt(&mut body, object);
     body.folded_table(&stages(object));
     Section {
         id: "good",
@@ -130,6 +131,50 @@ fn summary(body: &mut Html, object: &CalibratedObject, parts: &[Part<'_>]) {
         file.rank
     );
     body.element("li", &text).raw("</ul>");
+}
+
+/// All of it in one number a kind of currents, and by cause.
+fn felt(body: &mut Html, object: &CalibratedObject) {
+    let felt = object
+        .lambda
+        .headline
+        .as_ref()
+        .and_then(|headline| headline.felt.as_ref());
+    let Some(felt) = felt else {
+        return;
+    };
+    let robust = |of: FeltShares| of.robust.map_or_else(|| "-".to_owned(), percent);
+    let row = |name: &str, of: FeltShares| -> Vec<Cell> {
+        vec![
+            name.to_owned().into(),
+            percent(of.fixed).into(),
+            percent(of.feedback).into(),
+            robust(of).into(),
+        ]
+    };
+    let mut rows: Vec<Vec<Cell>> = felt
+        .parts
+        .iter()
+        .map(|part| row(part.cause.words(), part.error))
+        .collect();
+    rows.push(row("together", felt.total));
+    body.table(&Table {
+        caption:
+            "Felt error of the force vector, from file to finger, relative to the requested force"
+                .to_owned(),
+        head: vec![
+            ("cause", false),
+            ("static currents", true),
+            ("feedback", true),
+            ("chosen for uncertainties", true),
+        ],
+        rows,
+        prose: false,
+    });
+    body.element(
+        "p class=\"note\"",
+        &format!("Not modelled: {}.", felt.not_modelled.join("; ")),
+    );
 }
 
 /// One row a part, from file to finger.

@@ -20,3 +20,4 @@ pub mod pack;
 mod path;
 mod surface;
 pub mod sweep;
+mod uncertainty;

@@ -35,7 +35,7 @@ impl Surface {
             flags.iter().map(value).collect()
         };
         let error_n = object.curves.chosen.as_ref().map(|forces| {
-            let pairs = forces.static_n.iter().zip(&forces.wanted_n);
+            let pairs = forces.static_n.iter().zip(&forces.requested_n);
             at_points(&mut pairs.map(|(given, wanted)| given - wanted))
         });
         Self {

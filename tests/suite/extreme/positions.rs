@@ -148,7 +148,7 @@ fn one_position() -> Vec<Case> {
             },
         ),
         case(
-            "lambda: one position, a wanted force that is no number",
+            "lambda: one position, a requested force that is no number",
             "no current, saturated",
             0.0,
             || {

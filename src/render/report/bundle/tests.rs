@@ -28,7 +28,7 @@ fn plot() -> LambdaPlot {
         constants: Vec::new(),
         chosen: Some(ChosenForces {
             lambda_n_per_m: 0.7,
-            wanted_n: vec![0.021, 0.028, 0.035],
+            requested_n: vec![0.021, 0.028, 0.035],
             static_n: vec![0.020, 0.029, 0.032],
             feedback_n: Vec::new(),
             map: ErrorMap::Scattered {

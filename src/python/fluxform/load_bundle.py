@@ -596,7 +596,10 @@ def _allocate_vector(force_per_ampere, wanted, r, lower, upper, total, sideways_
     rows = np.column_stack([force_per_ampere * weights * (1 / largest), np.ones(len(r))])
     target = np.append(wanted * weights * (1 / largest), total)
     # Beside this file; bundles that request the upward force alone do without it.
-    from vector_dual import Dual
+    try:
+        from .vector_dual import Dual
+    except ImportError:
+        from vector_dual import Dual
     dual = Dual(rows, target, np.min(r) / r, lower, upper)
     with np.errstate(over="ignore", invalid="ignore"):
         reached = dual.solve()

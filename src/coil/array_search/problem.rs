@@ -1,0 +1,415 @@
+//! The array as a search problem: what is computed of a design, its objective, its limits.
+
+use std::sync::{PoisonError, RwLock};
+
+use serde::{Deserialize, Serialize};
+
+use fluxform_base::progress::Interrupted;
+use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
+use fluxform_design::Design;
+use fluxform_numerics::mixed_search::descent::Judged;
+use fluxform_numerics::mixed_search::{Problem, Variable};
+
+use super::positions::closest;
+use super::space::{Axis, Space};
+use crate::circuit::Circuit;
+use crate::limits::{Direction, Evaluated, LIMITS, LimitName, bobbin_bore_m};
+
+/// How accurately a design is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Coarse forces at few points: while searching.
+    Search,
+    /// As every other command computes: for what is accepted.
+    Full,
+}
+
+/// What is computed of a design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Physical {
+    /// The chosen force constant of every shape, N/m, above 0.
+    pub lambda_n_per_m: Vec<f64>,
+    /// Self inductance of a coil alone, H.
+    pub inductance_h: f64,
+    /// The largest among its neighbours, H.
+    pub array_inductance_h: f64,
+    /// Flux density in the core at the rated current, T.
+    pub core_field_t: Option<f64>,
+}
+
+/// Computes designs.
+pub trait Physics: Sync {
+    /// Of a design whose shapes are raised; `None` where it cannot be computed or renders nothing.
+    ///
+    /// # Errors
+    /// Interruption.
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted>;
+
+    /// Reports evaluations so far, and the best objective within the limits.
+    fn report(&self, _evaluations: usize, _best: Option<f64>) {}
+}
+
+impl Physical {
+    fn outputs(&self) -> Vec<f64> {
+        let lambdas = self.lambda_n_per_m.iter().copied();
+        let others = [self.inductance_h, self.array_inductance_h];
+        lambdas
+            .chain(others)
+            .chain(self.core_field_t)
+            .map(f64::ln)
+            .collect()
+    }
+
+    /// From the logarithms of `shapes` force constants, two inductances and a flux density.
+    #[must_use]
+    pub fn of_outputs(outputs: &[f64], shapes: usize) -> Option<Self> {
+        let value = |index: usize| outputs.get(index).map(|ln| ln.exp());
+        Some(Self {
+            lambda_n_per_m: outputs.get(..shapes)?.iter().map(|ln| ln.exp()).collect(),
+            inductance_h: value(shapes)?,
+            array_inductance_h: value(shapes + 1)?,
+            core_field_t: value(shapes + 2),
+        })
+    }
+}
+
+/// What is made as large as possible, of the shapes' force constants relative to the given design's.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Objective {
+    /// The smallest.
+    Smallest,
+    /// The geometric mean with these weights, one a shape.
+    Mean(Vec<f64>),
+}
+
+/// A limit beside the value it bounds, in the unit of its key.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounded {
+    /// Its key in results.
+    pub key: &'static str,
+    /// Its row of the table of limits, where it has one.
+    pub name: Option<LimitName>,
+    /// The design's value.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Whether the value is to be above.
+    pub at_least: bool,
+    /// What counts as large for the difference; `None`: it is relative.
+    scale: Option<f64>,
+}
+
+impl Bounded {
+    /// By how much the excess falls with a unit more of the limit.
+    #[must_use]
+    pub fn per_unit(&self) -> f64 {
+        let up = if self.at_least { -1.0 } else { 1.0 };
+        up / self.scale.unwrap_or(self.limit)
+    }
+
+    /// By how much the limit is broken: above 0 where it is.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        let over = match self.scale {
+            Some(scale) => (self.value - self.limit) / scale,
+            None => (self.value.max(f64::MIN_POSITIVE) / self.limit).ln(),
+        };
+        if self.at_least { -over } else { over }
+    }
+}
+
+/// What the search stays below limits that are not whole lengths of wire: lengths are rounded later.
+const MARGIN: f64 = 3e-5;
+/// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
+const LEAST_CORE_MM: f64 = 1.0;
+/// Distance of the magnet's centre from the core's top, mm, beside which a millimetre counts.
+const ROOM_MM: f64 = 10.0;
+
+/// The array as a problem of `numerics::mixed_search`.
+pub struct ArrayProblem<'a> {
+    /// The designs.
+    pub space: Space,
+    physics: &'a dyn Physics,
+    objective: Objective,
+    /// Logarithms of the force constants that count as 1.
+    reference_ln: Vec<f64>,
+    /// Height, m, below which nothing of the array may reach where the shapes are not raised.
+    ceiling_m: f64,
+    /// What full accuracy adds to the outputs of the search.
+    correction: RwLock<Vec<f64>>,
+}
+
+impl<'a> ArrayProblem<'a> {
+    /// A problem of `space`; `reference_n_per_m` are force constants that count as 1.
+    #[must_use]
+    pub fn new(
+        space: Space,
+        physics: &'a dyn Physics,
+        objective: Objective,
+        reference_n_per_m: &[f64],
+        ceiling_m: f64,
+    ) -> Self {
+        Self {
+            space,
+            physics,
+            objective,
+            reference_ln: reference_n_per_m.iter().map(|l| l.ln()).collect(),
+            ceiling_m,
+            correction: RwLock::default(),
+        }
+    }
+
+    fn corrected(&self, outputs: &[f64]) -> Vec<f64> {
+        let correction = self
+            .correction
+            .read()
+            .unwrap_or_else(PoisonError::into_inner);
+        let added = correction.iter().copied().chain(std::iter::repeat(0.0));
+        outputs.iter().zip(added).map(|(a, b)| a + b).collect()
+    }
+
+    /// Computes the design at `x` to full accuracy; by as much as its outputs differ from those of the
+    /// search, all of these are corrected from now on.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub fn correct(&self, x: &[f64], searched: &[f64]) -> Result<Option<Physical>, Interrupted> {
+        let full = self.physical(x, Level::Full)?;
+        if let Some(full) = &full {
+            let difference = full
+                .outputs()
+                .iter()
+                .zip(searched)
+                .map(|(a, b)| a - b)
+                .collect();
+            *self
+                .correction
+                .write()
+                .unwrap_or_else(PoisonError::into_inner) = difference;
+        }
+        Ok(full)
+    }
+
+    /// What is computed of the design as it is made.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub fn physical(&self, x: &[f64], level: Level) -> Result<Option<Physical>, Interrupted> {
+        let made = self.space.made(x);
+        self.physics
+            .compute(&self.space.design(&made), self.space.raised_m(&made), level)
+    }
+
+    /// What the corrected outputs stand for.
+    #[must_use]
+    pub fn estimate(&self, outputs: &[f64]) -> Option<Physical> {
+        Physical::of_outputs(&self.corrected(outputs), self.reference_ln.len())
+    }
+
+    /// The objective's parts: logarithms of the force constants over those of the reference.
+    #[must_use]
+    pub fn objectives(&self, physical: Option<&Physical>) -> Vec<f64> {
+        let Some(physical) = physical else {
+            return vec![0.0];
+        };
+        let ratios = physical.lambda_n_per_m.iter().zip(&self.reference_ln);
+        let ratios: Vec<f64> = ratios
+            .map(|(lambda, reference)| lambda.ln() - reference)
+            .collect();
+        match &self.objective {
+            Objective::Smallest => ratios,
+            Objective::Mean(weights) => {
+                let sum: f64 = ratios.iter().zip(weights).map(|(r, w)| r * w).sum();
+                vec![sum / weights.iter().sum::<f64>()]
+            }
+        }
+    }
+
+    /// The circuit of a coil alone, and its mass with its core, kg.
+    #[must_use]
+    pub fn coil(design: &Design, inductance_h: f64) -> Option<(Circuit, f64)> {
+        let coil = design.coil.as_ref()?;
+        let circuit = Circuit::of_inductance(coil, &design.wire, inductance_h);
+        let core = design.core.as_ref().map_or(0.0, |core| {
+            let radius_m = 0.5 * coil.inner_diameter_m - core.clearance_m;
+            let length_m = coil.length_m + core.above_m + core.below_m;
+            std::f64::consts::PI * radius_m * radius_m * length_m * STEEL_DENSITY_KG_PER_M3
+        });
+        Some((circuit, circuit.wire_mass_kg + core))
+    }
+
+    /// Every limit of the design at `x`, as far as `physical` lets it be known.
+    #[must_use]
+    pub fn bounds(&self, x: &[f64], physical: Option<&Physical>) -> Vec<Bounded> {
+        let design = self.space.design(x);
+        let Some((circuit, mass_kg)) =
+            Self::coil(&design, physical.map_or(f64::NAN, |p| p.inductance_h))
+        else {
+            return Vec::new();
+        };
+        let most_a = design
+            .supply
+            .current_max_a
+            .iter()
+            .copied()
+            .fold(0.0, f64::max);
+        let rated_a = circuit.rated_current_a(most_a, design.supply.voltage_v);
+        let at = Evaluated {
+            design: &design,
+            circuit: &circuit,
+            power_w: circuit.power_w(rated_a),
+            mass_kg,
+            core_field_t: physical.and_then(|p| p.core_field_t),
+            array_inductance_h: physical.map(|p| p.array_inductance_h),
+        };
+        let rows = LIMITS
+            .iter()
+            .filter(|row| row.name != LimitName::WindingFill);
+        let of_design = rows.filter_map(|row| {
+            let value = (row.value)(&at)?;
+            Some(Bounded {
+                key: row.key,
+                name: Some(row.name),
+                value,
+                limit: (row.of)(&design.limits)?,
+                at_least: row.direction == Direction::AtLeast,
+                scale: None,
+            })
+        });
+        let mut all: Vec<Bounded> = of_design.filter(|bound| bound.value.is_finite()).collect();
+        self.add_geometry(x, &design, &mut all);
+        all
+    }
+
+    fn add_geometry(&self, x: &[f64], design: &Design, all: &mut Vec<Bounded>) {
+        let Some(coil) = &design.coil else { return };
+        let mut add = |key, name: Option<LimitName>, value: f64, limit: f64, at_least, scale| {
+            all.push(Bounded {
+                key,
+                name,
+                value,
+                limit,
+                at_least,
+                scale,
+            });
+        };
+        if design.array.positions_m.len() > 1 {
+            let apart = closest(&design.array.positions_m);
+            add(
+                "pitch_m",
+                Some(LimitName::Pitch),
+                coil.outer_diameter_m,
+                apart,
+                false,
+                None,
+            );
+        }
+        if self.space.is_wound() {
+            let [outer, length] = [coil.outer_diameter_m, coil.length_m].map(|m| m * 1e3);
+            let ranges = [
+                ("search.coil.outer_diameter_mm", outer, self.space.outer_mm),
+                ("search.coil.length_mm", length, self.space.length_mm),
+            ];
+            for (key, value, [low, high]) in ranges {
+                // Whole lengths of wire are exact up to rounding.
+                add(key, None, value, high * (1.0 + MARGIN + 1e-12), false, None);
+                if low > 0.0 {
+                    add(key, None, value, low * (1.0 - MARGIN - 1e-12), true, None);
+                }
+            }
+            if design.limits.inner_diameter_min_m.is_none() {
+                let bobbin_m = bobbin_bore_m(design.wire.diameter_m);
+                add(
+                    "inner_diameter_m",
+                    Some(LimitName::InnerDiameter),
+                    coil.inner_diameter_m,
+                    bobbin_m,
+                    true,
+                    None,
+                );
+            }
+        }
+        let Some(core) = &design.core else { return };
+        let least_m = LEAST_CORE_MM * 1e-3;
+        let diameter_m = coil.inner_diameter_m - 2.0 * core.clearance_m;
+        add(
+            "core_diameter_m",
+            None,
+            diameter_m,
+            least_m,
+            true,
+            Some(ROOM_MM * 1e-3),
+        );
+        let length_m = coil.length_m + core.above_m + core.below_m;
+        add(
+            "core_length_m",
+            None,
+            length_m,
+            least_m,
+            true,
+            Some(ROOM_MM * 1e-3),
+        );
+        let ceiling_m = self.ceiling_m + self.space.raised_m(x).min(0.0) - 0.05 * diameter_m;
+        add(
+            "core_top_m",
+            None,
+            core.above_m,
+            ceiling_m,
+            false,
+            Some(ROOM_MM * 1e-3),
+        );
+    }
+
+    /// Whether a search would come nearer to its limit than rounding goes.
+    fn margin(bound: &Bounded) -> f64 {
+        match bound.name {
+            // Whole wires meet it exactly.
+            Some(LimitName::Length) => -1e-12,
+            _ => MARGIN,
+        }
+    }
+
+    /// Objective and limits from bounds that are known.
+    #[must_use]
+    pub fn judged(&self, physical: Option<&Physical>, bounds: &[Bounded]) -> Judged {
+        Judged {
+            objectives: self.objectives(physical),
+            limits: bounds
+                .iter()
+                .map(|bound| bound.excess() + Self::margin(bound))
+                .collect(),
+        }
+    }
+
+    /// Index of a variable.
+    #[must_use]
+    pub fn index(&self, axis: Axis) -> Option<usize> {
+        self.space.axes().iter().position(|known| *known == axis)
+    }
+}
+
+impl Problem for ArrayProblem<'_> {
+    fn variables(&self) -> &[Variable] {
+        self.space.variables()
+    }
+
+    fn outputs(&self, x: &[f64]) -> Result<Option<Vec<f64>>, Interrupted> {
+        Ok(self
+            .physical(x, Level::Search)?
+            .map(|physical| physical.outputs()))
+    }
+
+    fn judge(&self, x: &[f64], outputs: &[f64]) -> Judged {
+        let physical = self.estimate(outputs);
+        self.judged(physical.as_ref(), &self.bounds(x, physical.as_ref()))
+    }
+
+    fn report(&self, evaluations: usize, best: Option<f64>) {
+        self.physics.report(evaluations, best.map(f64::exp));
+    }
+}

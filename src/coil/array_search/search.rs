@@ -1,0 +1,276 @@
+//! The search itself: every choice begins, the better half goes on, the best is made at full accuracy.
+
+use fluxform_base::progress::Interrupted;
+use fluxform_design::Design;
+use fluxform_numerics::mixed_search::{MET, Search, Settings};
+
+use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics};
+use super::space::{Choice, Space, choices};
+
+/// What is searched, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// What is made as large as possible.
+    pub objective: Objective,
+    /// Evaluations, starts and seed.
+    pub settings: Settings,
+    /// Height, m, that no core may reach.
+    pub ceiling_m: f64,
+}
+
+/// Why there is no search.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// Keys or ranges.
+    #[error("{0}")]
+    Space(String),
+    /// No design within the ranges meets the limits that need no forces.
+    #[error(
+        "no design within [search] meets {limits}; the nearest, {nearest}, breaks {broken}: widen the ranges or relax a limit"
+    )]
+    Contradiction {
+        /// The limits that contradict each other or the ranges.
+        limits: String,
+        /// The design that breaks them least.
+        nearest: String,
+        /// By how much.
+        broken: String,
+    },
+    /// The given design renders nothing that it could be compared with.
+    #[error(
+        "the given design renders no force for {0}, so there is nothing to compare with: lower the shapes, or raise the limits of [supply]"
+    )]
+    NothingRendered(String),
+}
+
+/// A design with what was computed of it.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Its variables, as made.
+    pub x: Vec<f64>,
+    /// What was computed.
+    pub physical: Physical,
+    /// Its limits.
+    pub bounds: Vec<Bounded>,
+    /// To which accuracy.
+    pub level: Level,
+}
+
+impl Candidate {
+    /// Whether every limit is met.
+    #[must_use]
+    pub fn is_feasible(&self) -> bool {
+        self.bounds.iter().all(|bound| bound.excess() <= 0.0)
+    }
+}
+
+/// The result of a search.
+pub struct Found<'a> {
+    /// The problem of the best choice.
+    pub problem: &'a ArrayProblem<'a>,
+    /// What was learned about it.
+    pub search: Search<'a>,
+    /// The best design.
+    pub best: Candidate,
+    /// Evaluations of all choices.
+    pub evaluations: usize,
+    /// Choices that were searched.
+    pub choices: usize,
+    /// Whether it was interrupted.
+    pub interrupted: bool,
+}
+
+/// Descents to the limits of full accuracy.
+const CORRECTIONS: usize = 4;
+/// Evaluations of each, at most.
+const CORRECTING: usize = 24;
+/// Evaluations that every one of several choices has at least, per variable and in all.
+const LEAST_EVALUATIONS: usize = 16;
+
+/// The problems of every choice, after what can be known without forces.
+///
+/// # Errors
+/// Keys, ranges and limits that contradict each other.
+pub fn problems<'a>(
+    design: &Design,
+    request: &Request,
+    reference_n_per_m: &[f64],
+    physics: &'a dyn Physics,
+) -> Result<Vec<ArrayProblem<'a>>, Refused> {
+    let mut faults = Vec::new();
+    let mut problems = Vec::new();
+    for choice in choices(design, &design.search) {
+        match problem(design, request, &choice, reference_n_per_m, physics) {
+            Ok(problem) => problems.push(problem),
+            Err(refused) => faults.push(refused),
+        }
+    }
+    match faults.into_iter().next() {
+        Some(refused) if problems.is_empty() => Err(refused),
+        _ => Ok(problems),
+    }
+}
+
+fn problem<'a>(
+    design: &Design,
+    request: &Request,
+    choice: &Choice,
+    reference_n_per_m: &[f64],
+    physics: &'a dyn Physics,
+) -> Result<ArrayProblem<'a>, Refused> {
+    let space = Space::new(design, &design.search, choice).map_err(Refused::Space)?;
+    let problem = ArrayProblem::new(
+        space,
+        physics,
+        request.objective.clone(),
+        reference_n_per_m,
+        request.ceiling_m,
+    );
+    let search = Search::new(&problem, request.settings);
+    let (x, judged) = search.least_broken(&problem.space.given(design));
+    if judged.excess() <= MET {
+        return Ok(problem);
+    }
+    let bounds = problem.bounds(&x, None);
+    let broken: Vec<&Bounded> = bounds.iter().filter(|b| b.excess() > 0.0).collect();
+    let named: Vec<String> = broken
+        .iter()
+        .map(|b| described(b.key, b.limit, b.at_least))
+        .collect();
+    let nearest = problem.space.axes().iter().zip(&x);
+    let nearest: Vec<String> = nearest
+        .map(|(axis, x)| format!("{} = {x:.4}", axis.key()))
+        .collect();
+    let broken: Vec<String> = broken
+        .iter()
+        .map(|b| format!("{} = {:.5}", b.key, b.value))
+        .collect();
+    Err(Refused::Contradiction {
+        limits: named.join(" and "),
+        nearest: nearest.join(", "),
+        broken: broken.join(", "),
+    })
+}
+
+fn described(key: &str, limit: f64, at_least: bool) -> String {
+    let sign = if at_least { ">=" } else { "<=" };
+    format!("{key} {sign} {limit:.6}")
+}
+
+/// Searches every problem and computes the best design to full accuracy.
+///
+/// # Errors
+/// Interruption before anything is known.
+pub fn run<'a>(
+    problems: &'a [ArrayProblem<'a>],
+    design: &Design,
+    settings: Settings,
+) -> Result<Option<Found<'a>>, Interrupted> {
+    let mut going: Vec<(usize, Search<'a>)> = problems
+        .iter()
+        .enumerate()
+        .map(|(index, problem)| (index, Search::new(problem, settings)))
+        .collect();
+    let mut evaluations = 0;
+    let mut interrupted = false;
+    // The better half goes on with twice as many evaluations each.
+    while going.len() > 1 && !interrupted {
+        let each = (settings.evaluations / (2 * going.len())).max(LEAST_EVALUATIONS);
+        for (index, search) in &mut going {
+            let before = search.samples().len();
+            search.allow(before + each);
+            interrupted = search.run(&[problems[*index].space.given(design)]).is_err();
+            evaluations += search.samples().len() - before;
+            if interrupted {
+                break;
+            }
+        }
+        let merit = |search: &Search| {
+            search
+                .best()
+                .map_or(f64::NEG_INFINITY, |(_, judged)| judged.merit())
+        };
+        going.sort_by(|a, b| merit(&b.1).total_cmp(&merit(&a.1)).then(a.0.cmp(&b.0)));
+        going.truncate(going.len().div_ceil(2));
+    }
+    let Some((index, mut search)) = going.into_iter().next() else {
+        return Ok(None);
+    };
+    let problem = &problems[index];
+    let before = search.samples().len();
+    search.allow(settings.evaluations.max(before + LEAST_EVALUATIONS));
+    interrupted = interrupted || search.run(&[problem.space.given(design)]).is_err();
+    let mut best = match (interrupted, accept(problem, &mut search)) {
+        (false, Ok(best)) => best,
+        (true, _) | (_, Err(Interrupted)) => {
+            interrupted = true;
+            searched(problem, &search)
+        }
+    };
+    if let Some(best) = &mut best {
+        best.x = problem.space.made(&best.x);
+    }
+    evaluations += search.samples().len() - before;
+    Ok(best.map(|best| Found {
+        problem,
+        search,
+        best,
+        evaluations,
+        choices: problems.len(),
+        interrupted,
+    }))
+}
+
+/// The best design as the search knows it.
+fn searched(problem: &ArrayProblem, search: &Search) -> Option<Candidate> {
+    let (sample, _) = search.best()?;
+    let physical = problem.estimate(sample.outputs.as_ref()?)?;
+    Some(Candidate {
+        bounds: problem.bounds(&problem.space.made(&sample.x), Some(&physical)),
+        x: sample.x.clone(),
+        physical,
+        level: Level::Search,
+    })
+}
+
+/// The best design computed to full accuracy; where that breaks a limit, the search goes on with
+/// what full accuracy adds.
+fn accept(problem: &ArrayProblem, search: &mut Search) -> Result<Option<Candidate>, Interrupted> {
+    let mut best: Option<Candidate> = None;
+    for _ in 0..CORRECTIONS {
+        let Some((sample, _)) = search.best() else {
+            break;
+        };
+        let (x, Some(outputs)) = (sample.x.clone(), sample.outputs.clone()) else {
+            break;
+        };
+        let Some(physical) = problem.correct(&x, &outputs)? else {
+            break;
+        };
+        let made = problem.space.made(&x);
+        let candidate = Candidate {
+            bounds: problem.bounds(&made, Some(&physical)),
+            x: made,
+            physical,
+            level: Level::Full,
+        };
+        let value = |candidate: &Candidate| {
+            problem
+                .judged(Some(&candidate.physical), &candidate.bounds)
+                .merit()
+        };
+        let better = best.as_ref().is_none_or(|b| {
+            (candidate.is_feasible(), value(&candidate)) > (b.is_feasible(), value(b))
+        });
+        let same = best.as_ref().is_some_and(|b| b.x == candidate.x);
+        if better {
+            best = Some(candidate);
+        }
+        if same {
+            break;
+        }
+        search.allow(search.samples().len() + CORRECTING);
+        search.refine()?;
+    }
+    Ok(best)
+}

@@ -1,0 +1,445 @@
+//! What surrounds the best array: what limits are worth, what each variable bought, how far each may
+//! move, designs that are easier to make, and what the objective costs in mass, heat and time.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use fluxform_base::progress::Interrupted;
+use fluxform_design::Design;
+use fluxform_numerics::front::front;
+use fluxform_numerics::mixed_search::descent::Judged;
+use fluxform_numerics::mixed_search::surrogate::Surrogate;
+use fluxform_numerics::mixed_search::{Sample, Values};
+
+use super::problem::{ArrayProblem, Bounded, Physical};
+use super::search::Found;
+use crate::limits::LimitName;
+
+/// A limit of the best array.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LimitWorth {
+    /// Its key.
+    pub key: &'static str,
+    /// The array's value, in the unit of its key.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Whether it is met.
+    pub met: bool,
+    /// Whether more of it would give a larger objective.
+    pub active: bool,
+    /// By how much the objective would grow for one unit more of it, relative and to first order, by
+    /// the surrogate.
+    pub gain_per_unit: f64,
+    /// Which, where it is one of the design's.
+    #[serde(skip)]
+    pub name: Option<LimitName>,
+}
+
+/// What a variable bought, and how far it may move.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VariableStudy {
+    /// Its key.
+    pub key: String,
+    /// Its value in the best design.
+    pub value: f64,
+    /// That of the given design, moved into the range.
+    pub given: f64,
+    /// The best objective with the given value, the others searched again; null where none meets the
+    /// limits.
+    pub objective_without: Option<f64>,
+    /// Ends between which the objective loses at most one per cent, the others following; by the
+    /// surrogate.
+    pub range: [f64; 2],
+    /// The ends of the search.
+    pub searched: [f64; 2],
+}
+
+/// A design beside the best one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Neighbour {
+    /// What it is.
+    pub what: String,
+    /// Its variables by key.
+    pub values: BTreeMap<String, f64>,
+    /// Its objective.
+    pub objective: f64,
+}
+
+/// A point of a trade-off: no design that was evaluated costs less and gives as much.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrontPoint {
+    /// The quantity that is traded.
+    pub quantity: &'static str,
+    /// Its value, in the unit of its name.
+    pub value: f64,
+    /// The objective.
+    pub objective: f64,
+    /// The variables by key.
+    pub values: BTreeMap<String, f64>,
+}
+
+/// All of it.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Study {
+    /// Every limit, with what it is worth.
+    pub limits: Vec<LimitWorth>,
+    /// Every variable.
+    pub variables: Vec<VariableStudy>,
+    /// Designs that are easier to make.
+    pub neighbours: Vec<Neighbour>,
+    /// Trade-offs.
+    pub front: Vec<FrontPoint>,
+    /// Every design that was computed.
+    #[serde(skip)]
+    pub designs: Vec<TradedDesign>,
+    /// Of these the ones on the front of each quantity.
+    #[serde(skip)]
+    pub on_front: [Vec<usize>; 3],
+}
+
+/// A design with what it costs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TradedDesign {
+    /// The objective.
+    pub objective: f64,
+    /// The quantities of [`TRADED`].
+    pub costs: [f64; 3],
+    /// Whether it meets every limit.
+    pub met: bool,
+    /// Whether it does but for that of each quantity.
+    met_but: [bool; 3],
+    values: BTreeMap<String, f64>,
+}
+
+/// What the objective may lose within a range.
+const LOSS: f64 = 0.01;
+/// Weight of a range's width: limits' multipliers stay below the penalty for variables this flat.
+const FLATTEST: f64 = 0.02;
+/// Multipliers below this are rounding.
+const ACTIVE: f64 = 1e-4;
+/// Parts of the best design's mass, heat and time for which the best is computed.
+const PARTS: [f64; 6] = [0.5, 0.65, 0.8, 0.92, 1.15, 1.4];
+/// Steps to which neighbours' lengths are rounded, mm.
+const STEPS_MM: [f64; 2] = [0.5, 1.0];
+/// Evaluations that the study may add.
+const ROOM: usize = 80;
+
+/// The quantities that are traded for the objective, by key.
+pub const TRADED: [(&str, LimitName); 3] = [
+    ("array_mass_kg", LimitName::ArrayMass),
+    ("array_power_w", LimitName::ArrayPower),
+    ("array_settling_s", LimitName::ArraySettling),
+];
+
+/// A quantity of a design.
+fn traded(problem: &ArrayProblem, x: &[f64], physical: &Physical, name: LimitName) -> Option<f64> {
+    let design = problem.space.design(x);
+    let (circuit, mass_kg) = ArrayProblem::coil(&design, physical.inductance_h)?;
+    (name.limit().value)(&crate::limits::Evaluated {
+        design: &design,
+        circuit: &circuit,
+        power_w: 0.0,
+        mass_kg,
+        core_field_t: None,
+        array_inductance_h: Some(physical.array_inductance_h),
+    })
+}
+
+/// A view of a result that was found.
+struct View<'a, 'b> {
+    found: &'b mut Found<'a>,
+    surrogate: Surrogate,
+}
+
+/// The surroundings of `found`, compared with `design`.
+///
+/// # Errors
+/// Interruption.
+pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
+    let allowed = found.search.samples().len() + ROOM;
+    found.search.allow(allowed);
+    let Some(surrogate) = found.search.surrogate() else {
+        return Ok(Study::default());
+    };
+    let mut view = View { found, surrogate };
+    let limits = view.limits();
+    let before = view.found.search.samples().len();
+    let variables = view.variables(design)?;
+    let neighbours = view.neighbours()?;
+    view.trade()?;
+    view.found.evaluations += view.found.search.samples().len() - before;
+    let designs = view.designs();
+    let on_front = std::array::from_fn(|cost| on_front(&designs, cost));
+    let mut front = Vec::new();
+    for ((quantity, _), (cost, on)) in TRADED.iter().zip(on_front.iter().enumerate()) {
+        let on: &Vec<usize> = on;
+        front.extend(on.iter().map(|index| FrontPoint {
+            quantity,
+            value: designs[*index].costs[cost],
+            objective: designs[*index].objective,
+            values: designs[*index].values.clone(),
+        }));
+    }
+    Ok(Study {
+        limits,
+        variables,
+        neighbours,
+        front,
+        designs,
+        on_front,
+    })
+}
+
+impl View<'_, '_> {
+    fn problem(&self) -> &ArrayProblem<'_> {
+        self.found.problem
+    }
+
+    fn named(&self, x: &[f64]) -> BTreeMap<String, f64> {
+        let made = self.problem().space.made(x);
+        self.problem()
+            .space
+            .axes()
+            .iter()
+            .map(|axis| axis.key())
+            .zip(made)
+            .collect()
+    }
+
+    /// The problem's own judgement of what the surrogate has.
+    fn judge(&self, x: &[f64], outputs: &[f64]) -> Judged {
+        let physical = self.problem().estimate(outputs);
+        self.problem().judged(
+            physical.as_ref(),
+            &self.problem().bounds(x, physical.as_ref()),
+        )
+    }
+
+    fn limits(&self) -> Vec<LimitWorth> {
+        let best = &self.found.best;
+        let whole = self.problem().space.variables().iter().enumerate();
+        let whole = whole.filter(|(_, variable)| variable.values != Values::Continuous);
+        let fixed: Vec<_> = whole.map(|(index, _)| (index, best.x[index])).collect();
+        let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
+        let ended = self
+            .found
+            .search
+            .climb_otherwise(&self.surrogate, &judge, &best.x, &fixed);
+        let multipliers = ended.map_or_else(Vec::new, |(_, ended)| ended.multipliers);
+        let worth = |(index, bound): (usize, &Bounded)| {
+            let multiplier = multipliers.get(index).copied().unwrap_or(0.0);
+            LimitWorth {
+                key: bound.key,
+                value: bound.value,
+                limit: bound.limit,
+                met: bound.excess() <= 0.0,
+                active: multiplier > ACTIVE,
+                gain_per_unit: if multiplier > ACTIVE {
+                    multiplier * bound.per_unit()
+                } else {
+                    0.0
+                },
+                name: bound.name,
+            }
+        };
+        best.bounds.iter().enumerate().map(worth).collect()
+    }
+
+    /// The objective of a design that is evaluated for it, where it meets the limits.
+    fn evaluated(&mut self, x: Vec<f64>) -> Result<Option<f64>, Interrupted> {
+        self.found.search.evaluate(vec![x.clone()])?;
+        let sample = self
+            .found
+            .search
+            .samples()
+            .iter()
+            .find(|sample| sample.x == x);
+        let judged = sample.and_then(|sample| self.found.search.judged(sample));
+        // A surrogate's design may be off a limit by its own error.
+        let met = judged.filter(|judged| judged.excess() <= OFF);
+        Ok(met.map(|judged| judged.objective().exp()))
+    }
+
+    fn variables(&mut self, design: &Design) -> Result<Vec<VariableStudy>, Interrupted> {
+        let given = self.problem().space.given(design);
+        let mut all = Vec::new();
+        for (index, axis) in self.problem().space.axes().to_vec().into_iter().enumerate() {
+            let variable = self.problem().space.variables()[index].clone();
+            let x = self.found.best.x.clone();
+            let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
+            let search = &self.found.search;
+            let held =
+                search.climb_otherwise(&self.surrogate, &judge, &x, &[(index, given[index])]);
+            let held = held.filter(|(_, ended)| ended.judged.excess() <= OFF);
+            let range = [false, true].map(|up| self.end_of_range(index, up));
+            let objective_without = match held {
+                Some((x, _)) => self.evaluated(x)?,
+                None => None,
+            };
+            all.push(VariableStudy {
+                key: axis.key(),
+                value: x[index],
+                given: given[index],
+                objective_without,
+                range,
+                searched: [variable.low, variable.high],
+            });
+        }
+        Ok(all)
+    }
+
+    /// How far a variable can be moved while the objective loses at most a hundredth.
+    fn end_of_range(&self, index: usize, up: bool) -> f64 {
+        let variable = &self.problem().space.variables()[index];
+        let width = variable.high - variable.low;
+        let sign = if up { 1.0 } else { -1.0 };
+        let x = &self.found.best.x;
+        let surrogate = &self.surrogate;
+        let search = &self.found.search;
+        let here = self.judge(x, &surrogate.at(&search.units(x))).objective();
+        let judge = |x: &[f64], outputs: &[f64]| {
+            let mut judged = self.judge(x, outputs);
+            judged
+                .limits
+                .push(here + (1.0 - LOSS).ln() - judged.objective());
+            judged.objectives = vec![FLATTEST * sign * x[index] / width];
+            judged
+        };
+        let ended = search.climb_otherwise(surrogate, &judge, x, &[]);
+        let moved = ended.filter(|(_, ended)| ended.judged.excess() <= OFF);
+        let end = moved.map_or(x[index], |(x, _)| x[index]);
+        if up {
+            end.max(x[index])
+        } else {
+            end.min(x[index])
+        }
+    }
+
+    /// The best design with lengths of half and whole millimetres, found one after the other.
+    fn neighbours(&mut self) -> Result<Vec<Neighbour>, Interrupted> {
+        let mut all = Vec::new();
+        for step in STEPS_MM {
+            let mut x = self.found.best.x.clone();
+            let mut fixed: Vec<(usize, f64)> = Vec::new();
+            let variables = self.problem().space.variables().to_vec();
+            let continuous = variables
+                .iter()
+                .enumerate()
+                .filter(|(_, v)| v.values == Values::Continuous);
+            for (index, variable) in continuous {
+                let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
+                let near = [
+                    (x[index] / step).floor() * step,
+                    (x[index] / step).ceil() * step,
+                ];
+                let tried = near
+                    .iter()
+                    .filter(|v| (variable.low..=variable.high).contains(*v))
+                    .filter_map(|v| {
+                        let held: Vec<_> = fixed.iter().copied().chain([(index, *v)]).collect();
+                        let ended = self.found.search.climb_otherwise(
+                            &self.surrogate,
+                            &judge,
+                            &x,
+                            &held,
+                        )?;
+                        Some((ended.1.judged.merit(), *v, ended.0))
+                    });
+                let Some((_, value, at)) = tried.reduce(|a, b| if b.0 > a.0 { b } else { a })
+                else {
+                    break;
+                };
+                fixed.push((index, value));
+                x = at;
+            }
+            let values = self.named(&x);
+            if let Some(objective) = self.evaluated(x)? {
+                all.push(Neighbour {
+                    what: format!("lengths of {step} mm steps"),
+                    values,
+                    objective,
+                });
+            }
+        }
+        Ok(all)
+    }
+
+    /// Computes the best designs of less and more mass, heat and time.
+    fn trade(&mut self) -> Result<(), Interrupted> {
+        for (_, name) in TRADED {
+            let best = &self.found.best;
+            let Some(here) = traded(self.problem(), &best.x, &best.physical, name) else {
+                continue;
+            };
+            for part in PARTS {
+                let judge = |x: &[f64], outputs: &[f64]| {
+                    let physical = self.problem().estimate(outputs);
+                    let mut bounds = self.problem().bounds(x, physical.as_ref());
+                    bounds.retain(|bound| bound.name != Some(name));
+                    let mut judged = self.problem().judged(physical.as_ref(), &bounds);
+                    let value = physical.and_then(|p| traded(self.problem(), x, &p, name));
+                    judged
+                        .limits
+                        .push((value.unwrap_or(f64::NAN) / (part * here)).ln());
+                    judged
+                };
+                let ended =
+                    self.found
+                        .search
+                        .climb_otherwise(&self.surrogate, &judge, &best.x, &[]);
+                if let Some((x, _)) = ended.filter(|(_, ended)| ended.judged.excess() <= OFF) {
+                    self.found.search.evaluate(vec![x])?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every design that was computed.
+    fn designs(&self) -> Vec<TradedDesign> {
+        let problem = self.problem();
+        let design = |sample: &Sample| {
+            let physical = problem.estimate(sample.outputs.as_ref()?)?;
+            let bounds = problem.bounds(&sample.x, Some(&physical));
+            let met_but = TRADED.map(|(_, name)| {
+                let others = bounds.iter().filter(|bound| bound.name != Some(name));
+                others.fold(true, |met, bound| met && bound.excess() <= 0.0)
+            });
+            let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
+            let [Some(mass), Some(power), Some(settling)] = costs else {
+                return None;
+            };
+            let judged = problem.judged(Some(&physical), &bounds);
+            Some(TradedDesign {
+                objective: judged.objective().exp(),
+                costs: [mass, power, settling],
+                met: bounds.iter().all(|bound| bound.excess() <= 0.0),
+                met_but,
+                values: self.named(&sample.x),
+            })
+        };
+        self.found
+            .search
+            .samples()
+            .iter()
+            .filter_map(design)
+            .collect()
+    }
+}
+
+/// Of the designs that meet all limits but that of one cost those that nothing beats.
+fn on_front(designs: &[TradedDesign], cost: usize) -> Vec<usize> {
+    let met: Vec<usize> = (0..designs.len())
+        .filter(|index| designs[*index].met_but[cost])
+        .collect();
+    let points: Vec<[f64; 2]> = met
+        .iter()
+        .map(|index| [designs[*index].costs[cost], designs[*index].objective])
+        .collect();
+    front(&points).into_iter().map(|index| met[index]).collect()
+}
+
+/// Excess that is the surrogate's error.
+const OFF: f64 = 2e-4;

@@ -1,0 +1,155 @@
+//! The search of arrays on forces known in closed form.
+
+use std::path::Path;
+
+use fluxform_base::progress::Interrupted;
+use fluxform_design::{Design, Need};
+use fluxform_numerics::mixed_search::Settings;
+
+use super::problem::{Level, Objective, Physical, Physics};
+use super::search::{Request, problems, run};
+use super::study::study;
+use crate::circuit;
+use crate::inductance::self_inductance_h;
+
+/// The force of one coil in air on its axis, over the height.
+struct OnAxis;
+
+impl Physics for OnAxis {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        _: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let Some(coil) = &design.coil else {
+            return Ok(None);
+        };
+        let winding = circuit::winding(coil, &design.wire);
+        let height_m = design.target_height_m + raised_m;
+        let Ok(field) = winding.field(0.0, height_m) else {
+            return Ok(None);
+        };
+        let inductance_h = self_inductance_h(&winding);
+        Ok(Some(Physical {
+            lambda_n_per_m: vec![field.dbz_dz.abs() / height_m],
+            inductance_h,
+            array_inductance_h: inductance_h,
+            core_field_t: None,
+        }))
+    }
+}
+
+fn design(search: &str) -> Design {
+    let text = format!(
+        "name = 'one'\n[coil]\ninner_diameter_mm = 20.0\nouter_diameter_mm = 34.0\nlength_mm = 70.0\n\
+         [wire]\ndiameter_mm = 0.7\n[limits]\nresistance_max_ohm = 6.0\nouter_diameter_max_mm = 38.0\n\
+         length_max_mm = 100.0\nsettling_max_ms = 20.0\ninner_diameter_min_mm = 3.0\n{search}"
+    );
+    Design::from_toml(&text, Path::new("one.toml"), Need::OPTIMIZE)
+        .expect("a design")
+        .0
+}
+
+fn request() -> Request {
+    Request {
+        objective: Objective::Smallest,
+        settings: Settings {
+            evaluations: 200,
+            ..Settings::default()
+        },
+        ceiling_m: 0.03,
+    }
+}
+
+const ONE_COIL: &str = "[search]\ncoil.inner_diameter_mm = [3.0, 36.0]\ncoil.outer_diameter_mm = [5.0, 38.0]\n\
+                        coil.length_mm = [3.0, 100.0]\n";
+
+/// The array of one coil under a point on its axis is what `optimize --wound` finds.
+#[test]
+fn one_coil_alone_is_the_best_coil_of_eq_11() {
+    use crate::optimum::air::AirCoil;
+    use crate::optimum::{Settings, optimise_wound};
+    use fluxform_field::magnet::MagnetRule;
+    let design = design(ONE_COIL);
+    let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
+    let found = run(&all, &design, request().settings)
+        .expect("not interrupted")
+        .expect("a design");
+    assert!(found.best.is_feasible(), "{:?}", found.best.bounds);
+    let task =
+        crate::optimum::task::of_design(&design, crate::optimum::Fixed::default()).expect("a task");
+    let model = AirCoil::new(0.03, &MagnetRule::dipole([0.0, 0.0, -0.9])).expect("above");
+    let best = optimise_wound(
+        &model,
+        &task,
+        &Settings::default(),
+        &fluxform_base::progress::Silent,
+    )
+    .expect("not interrupted")
+    .best
+    .expect("a coil");
+    let made = found
+        .problem
+        .space
+        .design(&found.best.x)
+        .coil
+        .expect("a coil");
+    let known = circuit::winding(
+        &fluxform_design::Coil {
+            inner_diameter_m: 2.0 * best.window.inner_radius_m,
+            outer_diameter_m: 2.0 * best.window.outer_radius_m(),
+            length_m: best.window.length_m,
+            turns: Some(best.turns),
+        },
+        &design.wire,
+    );
+    let ours = circuit::winding(&made, &design.wire);
+    let force = |winding: fluxform_field::winding::Winding| {
+        winding.field(0.0, 0.03).expect("in air").dbz_dz
+    };
+    let share = force(ours) / force(known);
+    println!("{share} {} {made:?}", found.evaluations);
+    assert!(share > 1.0 - 1e-3, "{share} {made:?}");
+}
+
+#[test]
+fn the_study_holds_against_what_it_says() {
+    let design = design(ONE_COIL);
+    let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
+    let mut found = run(&all, &design, request().settings)
+        .expect("not interrupted")
+        .expect("a design");
+    let study = study(&mut found, &design).expect("not interrupted");
+    let resistance = study
+        .limits
+        .iter()
+        .find(|limit| limit.key == "resistance_ohm")
+        .expect("a limit");
+    assert!(resistance.active && resistance.met, "{resistance:?}");
+    // One per cent more of it, searched again: whole wires leave less than the surrogate promises.
+    for variable in &study.variables {
+        let [low, high] = variable.range;
+        assert!(
+            low <= variable.value && variable.value <= high,
+            "{variable:?}"
+        );
+    }
+    assert!(study.front.len() > 3, "{:?}", study.front);
+    assert!(
+        study
+            .variables
+            .iter()
+            .any(|v| v.objective_without.is_some())
+    );
+}
+
+#[test]
+fn limits_that_no_design_meets_are_named_before_anything_is_computed() {
+    let text = ONE_COIL.replace("[5.0, 38.0]", "[45.0, 60.0]");
+    let refused = problems(&design(&text), &request(), &[1.0], &OnAxis)
+        .err()
+        .expect("a contradiction")
+        .to_string();
+    assert!(refused.contains("outer_diameter"), "{refused}");
+}

@@ -1,0 +1,311 @@
+//! `optimize --for`: arguments, files and the summary.
+
+use clap::Args;
+
+use super::physics::{ArrayPhysics, Constant, Journal};
+use super::{ArrayEnding, ArrayOptimization, ArrayRequest, optimize_array, tables, text};
+use crate::RunError;
+use crate::bundle::atomic::{Overwrite, check_distinct, write};
+use crate::cli::args::SurfaceFlags;
+use crate::cli::documents;
+use crate::cli::failure::{Failure, Wish};
+use crate::cli::pictures::Picture;
+use crate::cli::printer::{Printer, Stream};
+use crate::cli::start::begin;
+use crate::cli::values::{self, FileArgument};
+use crate::coil::array_search::problem::Level;
+use crate::commands::optimize::Document;
+use crate::commands::sweep::axis;
+use crate::design::template::Template;
+use crate::design::{Design, Need};
+use crate::numerics::mixed_search::Settings;
+use crate::progress::{Interrupted, Progress};
+
+/// An array for shapes instead of a coil.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "The whole array, for shapes")]
+pub struct ArrayFlags {
+    /// Shapes over which the array is to be felt best: coil, core, wire and positions together, as
+    /// far as [search] or --vary says
+    #[arg(long = "for", value_name = "SHAPE", num_args = 1..)]
+    pub shapes: Vec<FileArgument>,
+    /// Vary a key besides those of [search]: KEY=FROM:TO or KEY=A,B,C, like array.pitch_mm=40:60
+    #[arg(long, value_name = "KEY=VALUES", requires = "shapes")]
+    pub vary: Vec<String>,
+    /// The force constant that is made large
+    #[arg(long, value_name = "NAME", requires = "shapes", default_value = "jnd",
+          value_parser = values::named::<Constant>())]
+    pub constant: Constant,
+    /// Weights of the shapes in the geometric mean of their force constants, in order [default:
+    /// equal]
+    #[arg(long, hide_short_help = true, value_name = "W,...", requires = "shapes", value_delimiter = ',',
+          num_args = 1.., conflicts_with = "smallest")]
+    pub shares: Vec<f64>,
+    /// Make the smallest of the shapes' gains large, not their mean
+    #[arg(long, requires = "shapes")]
+    pub smallest: bool,
+    /// Most arrays that the search computes
+    #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
+    pub evaluations: usize,
+    /// Write the trade-offs against mass, heat and settling here (CSV)
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
+    pub front: Option<FileArgument>,
+    /// Draw them here (SVG)
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
+    pub plot: Option<FileArgument>,
+    /// Keep every array that is computed in this file, and take from it those of an earlier run
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
+    pub journal: Option<FileArgument>,
+    #[command(flatten)]
+    pub surface: SurfaceFlags,
+}
+
+/// What the two kinds of `optimize` share.
+pub struct Shared<'a> {
+    /// Design file.
+    pub design: &'a FileArgument,
+    /// Local searches.
+    pub starts: Option<usize>,
+    /// Where the sequence begins.
+    pub seed: u64,
+    /// Where the best design goes.
+    pub out: Option<&'a FileArgument>,
+    /// Whether existing files are replaced.
+    pub force: bool,
+    /// Allowed error.
+    pub tolerance: Option<f64>,
+}
+
+impl ArrayFlags {
+    /// Runs the search.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, shared: &Shared<'_>, printer: &Printer) -> Result<(), Failure> {
+        let (document, shapes) = documents::design_and_shapes(
+            shared.design,
+            Need::CALIBRATE,
+            &self.shapes,
+            &self.surface,
+            printer,
+        )?;
+        let path = shared.design.as_given();
+        let text = self.varied(&document.text, path)?;
+        let (design, _) = Design::from_toml(&text, path, Need::CALIBRATE)
+            .map_err(|fault| Failure::Documents(vec![fault]))?;
+        let mut inputs = vec![document.input.clone()];
+        inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
+        let mark = super::super::command::mark(shared.design, &document.text);
+        let overwrite = Overwrite::beginning(shared.force, &mark, &inputs[..1])
+            .protecting(document.also_read());
+        if let Some(FileArgument::Path(path)) = shared.out {
+            overwrite.check(path).map_err(RunError::from)?;
+        }
+        let files = [
+            shared.out,
+            self.front.as_ref(),
+            self.plot.as_ref(),
+            self.journal.as_ref(),
+        ];
+        let paths = files.into_iter().flatten().filter_map(|file| match file {
+            FileArgument::Path(path) => Some(path),
+            FileArgument::Standard => None,
+        });
+        check_distinct(&paths.collect::<Vec<_>>()).map_err(RunError::from)?;
+        let pictures = [&self.front, &self.plot].map(|file| {
+            file.as_ref()
+                .map(|file| Picture::new(file, shared.force, document.also_read()))
+        });
+        for picture in pictures.iter().flatten() {
+            picture.check(&inputs)?;
+        }
+        let bar = begin(printer);
+        let physics = ArrayPhysics::new(
+            &shapes,
+            (self.constant, crate::units::FORCE_JND),
+            shared.tolerance,
+            &bar,
+        )?;
+        self.read_journal(&physics)?;
+        let request = self.request(shared, shapes.len())?;
+        printer.notice(&estimate(&design, &physics, &request));
+        let source = Document {
+            design: &design,
+            text: &text,
+            path,
+        };
+        let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
+        let journal = physics.journal();
+        let seconds = bar.take_seconds();
+        drop(physics);
+        drop(bar);
+        self.write_journal(&journal, &overwrite)?;
+        let result = ended?;
+        for warning in &result.warnings {
+            printer.warning(warning);
+        }
+        let mut place = write_design(&result, &mark, &overwrite, shared.out, printer)?;
+        let tables = [Some(tables::csv(&result)), tables::svg(&result)];
+        for (picture, table) in pictures.iter().zip(tables) {
+            if let (Some(picture), Some(table)) = (picture, table)
+                && picture.write(&result.inputs, &table, printer)? == Stream::Error
+            {
+                place = Stream::Error;
+            }
+        }
+        let json = printer.with_warnings(&result);
+        printer.summary(place, &json, || {
+            text::summary(&result, shared.out, &seconds)
+        })?;
+        match result.status {
+            ArrayEnding::Done => Ok(()),
+            ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
+            ArrayEnding::Infeasible => Err(Failure::Unmet(
+                Wish::Coil,
+                "no array that was computed meets every limit; the result is the one that breaks them least".to_owned(),
+            )),
+        }
+    }
+
+    /// The design's text with what the flags vary.
+    fn varied(&self, text: &str, path: &std::path::Path) -> Result<String, Failure> {
+        if self.vary.is_empty() {
+            return Ok(text.to_owned());
+        }
+        let template =
+            Template::new(text, path).map_err(|fault| Failure::Documents(vec![fault]))?;
+        let mut settings = Vec::new();
+        for given in &self.vary {
+            let (key, values) =
+                vary(given).map_err(|wrong| Failure::Usage(format!("--vary {given}: {wrong}")))?;
+            settings.push((format!("search.{key}"), values));
+        }
+        let settings = settings
+            .iter()
+            .map(|(key, value)| (key.as_str(), value.clone()));
+        template.with(settings).map_err(Failure::Usage)
+    }
+
+    fn request(&self, shared: &Shared<'_>, shapes: usize) -> Result<ArrayRequest, Failure> {
+        let sound = |share: &f64| *share > 0.0 && share.is_finite();
+        if !self.shares.is_empty()
+            && (self.shares.len() != shapes || !self.shares.iter().all(sound))
+        {
+            return Err(Failure::Usage(format!(
+                "--shares gives {} weights for {shapes} shapes: expected one above 0 for each",
+                self.shares.len()
+            )));
+        }
+        let equal = || vec![1.0; shapes];
+        let default = Settings::default();
+        Ok(ArrayRequest {
+            constant: self.constant,
+            jnd_weight: crate::units::FORCE_JND,
+            shares: (!self.smallest).then(|| {
+                if self.shares.is_empty() {
+                    equal()
+                } else {
+                    self.shares.clone()
+                }
+            }),
+            settings: Settings {
+                seed: shared.seed,
+                starts: shared.starts.unwrap_or(default.starts),
+                evaluations: self.evaluations.max(1),
+                ..default
+            },
+            tolerance: shared.tolerance,
+        })
+    }
+
+    fn read_journal(&self, physics: &ArrayPhysics) -> Result<(), Failure> {
+        let Some(FileArgument::Path(path)) = &self.journal else {
+            return Ok(());
+        };
+        if !path.exists() {
+            return Ok(());
+        }
+        let text = crate::design::source::text_of(path)
+            .map_err(|fault| Failure::Documents(vec![fault]))?;
+        let lines: String = text.lines().filter(|line| !line.starts_with('#')).collect();
+        let journal = serde_json::from_str(&lines).map_err(|wrong| {
+            Failure::Input(format!(
+                "{}: not a journal of `optimize --for`: {wrong}",
+                path.display()
+            ))
+        })?;
+        physics.remember(journal);
+        Ok(())
+    }
+
+    fn write_journal(&self, journal: &Journal, overwrite: &Overwrite) -> Result<(), Failure> {
+        let Some(FileArgument::Path(path)) = &self.journal else {
+            return Ok(());
+        };
+        let text =
+            serde_json::to_string_pretty(journal).map_err(|e| Failure::Input(e.to_string()))?;
+        write(path, overwrite, |out| out.write_all(text.as_bytes())).map_err(RunError::from)?;
+        Ok(())
+    }
+}
+
+/// `KEY=FROM:TO` or `KEY=A,B,C` as a key of `[search]` and its value.
+fn vary(text: &str) -> Result<(String, toml::Value), String> {
+    let number = |text: &str| {
+        text.trim()
+            .parse::<f64>()
+            .map_err(|_| format!("expected a number, found {text:?}"))
+    };
+    if let Some((key, range)) = text.split_once('=')
+        && let Some((from, to)) = range.split_once(':')
+    {
+        let ends = [number(from)?, number(to)?].map(toml::Value::Float);
+        return Ok((key.trim().to_owned(), toml::Value::Array(ends.to_vec())));
+    }
+    let axis = axis::parse(text)?;
+    let values = axis
+        .values
+        .iter()
+        .map(crate::commands::sweep::toml_value)
+        .collect();
+    Ok((axis.key, toml::Value::Array(values)))
+}
+
+/// What will be computed, said first.
+fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
+    let steel = crate::scene::cost::of_steel(design, physics.tolerance(Level::Search));
+    let seconds: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();
+    let each = seconds
+        + physics.count(Level::Search) as f64
+            * design.array.positions_m.len() as f64
+            * POINT_COIL_S;
+    format!(
+        "computes {} arrays at most, about {:.0} CPU s; Ctrl-C gives the best so far",
+        request.settings.evaluations,
+        (each * request.settings.evaluations as f64).ceil()
+    )
+}
+
+/// CPU time of a coil's force at a point through coupled steel, s.
+const POINT_COIL_S: f64 = 2e-6;
+
+fn write_design(
+    result: &ArrayOptimization,
+    mark: &str,
+    overwrite: &Overwrite,
+    out: Option<&FileArgument>,
+    printer: &Printer,
+) -> Result<Stream, Failure> {
+    let text = format!("{mark}\n{}", result.design_text);
+    match out {
+        None => Ok(Stream::Output),
+        Some(FileArgument::Standard) => {
+            printer.data(|out| out.write_all(text.as_bytes()))?;
+            Ok(Stream::Error)
+        }
+        Some(FileArgument::Path(path)) => {
+            write(path, overwrite, |out| out.write_all(text.as_bytes())).map_err(RunError::from)?;
+            Ok(Stream::Output)
+        }
+    }
+}

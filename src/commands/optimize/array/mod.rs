@@ -1,0 +1,303 @@
+//! `optimize --for`: the array that is felt best over given shapes.
+
+pub(crate) mod command;
+pub(crate) mod physics;
+mod result;
+pub(crate) mod tables;
+mod text;
+
+use std::collections::BTreeMap;
+
+pub use result::*;
+
+use self::physics::{ArrayPhysics, Constant};
+use super::Document;
+use crate::RunError;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::coil::array_search::problem::{Level, Objective, Physical, Physics};
+use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
+use crate::coil::array_search::study::{Study, study};
+use crate::commands::evaluate::evaluate;
+use crate::design::template::Template;
+use crate::design::{Design, Need};
+use crate::numerics::mixed_search::Settings;
+use crate::progress::{Interrupted, Progress};
+use crate::scene::Scene;
+use crate::scene::sources::ShapeSource;
+
+/// The options of [`optimize_array`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArrayRequest {
+    /// What is made large.
+    pub constant: Constant,
+    /// Just-noticeable difference.
+    pub jnd_weight: f64,
+    /// Weights of the shapes in the geometric mean; `None`: the smallest counts.
+    pub shares: Option<Vec<f64>>,
+    /// Evaluations, starts, seed.
+    pub settings: Settings,
+    /// Allowed error of the final evaluation.
+    pub tolerance: Option<f64>,
+}
+
+/// What every shape renders with the given design, at both levels.
+struct Before {
+    search: Physical,
+    full: Physical,
+}
+
+/// The best array for `shapes` within the limits and the `[search]` of a design.
+///
+/// # Errors
+/// A design that cannot be searched, with the reason; interruption before anything is known.
+pub fn optimize_array(
+    document: &Document<'_>,
+    shapes: &[ShapeSource],
+    inputs: Vec<Input>,
+    request: &ArrayRequest,
+    physics: &ArrayPhysics<'_>,
+    progress: &dyn Progress,
+) -> Result<ArrayOptimization, RunError> {
+    let design = document.design;
+    let search = Request {
+        objective: match &request.shares {
+            Some(shares) => Objective::Mean(shares.clone()),
+            None => Objective::Smallest,
+        },
+        settings: request.settings,
+        ceiling_m: ceiling_m(design, physics),
+    };
+    // What contradicts itself is known before anything is computed.
+    let refused = |refused: Refused| RunError::Input(refused.to_string());
+    problems(design, &search, &vec![1.0; shapes.len()], physics).map_err(refused)?;
+    progress.begin("given design", 2);
+    let before = before(design, shapes, physics, progress)?;
+    progress.end();
+    let all = problems(design, &search, &before.search.lambda_n_per_m, physics).map_err(refused)?;
+    progress.begin("arrays", request.settings.evaluations as u64);
+    let found = run(&all, design, request.settings)?;
+    let Some(mut found) = found else {
+        return Err(RunError::Interrupted(Interrupted));
+    };
+    let around = match found.interrupted {
+        false => study(&mut found, design).ok(),
+        true => None,
+    };
+    progress.end();
+    // Nothing more is computed after the user's stop.
+    found.interrupted |= progress.interrupted();
+    result(
+        document,
+        (shapes, inputs),
+        request,
+        physics,
+        (&before, &found, around),
+    )
+}
+
+/// The height that no core may reach: the workspace's lowest, the target's and the shapes' lowest
+/// point, less what the magnet takes.
+fn ceiling_m(design: &Design, physics: &ArrayPhysics) -> f64 {
+    let lowest = physics
+        .lowest_m()
+        .min(design.workspace.z_m.from)
+        .min(design.target_height_m);
+    lowest - Scene::new(design).map_or(0.0, |scene| scene.magnet_depth_m())
+}
+
+fn before(
+    design: &Design,
+    shapes: &[ShapeSource],
+    physics: &ArrayPhysics,
+    progress: &dyn Progress,
+) -> Result<Before, RunError> {
+    let rendered = |level| -> Result<Physical, RunError> {
+        let physical = physics.rendered(design, 0.0, level)?;
+        progress.advance(1);
+        physical.ok_or_else(|| {
+            let names: Vec<&str> = shapes
+                .iter()
+                .map(|shape| shape.document.name.as_str())
+                .collect();
+            RunError::Input(Refused::NothingRendered(names.join(", ")).to_string())
+        })
+    };
+    Ok(Before {
+        search: rendered(Level::Search)?,
+        full: rendered(Level::Full)?,
+    })
+}
+
+fn result(
+    document: &Document<'_>,
+    (shapes, inputs): (&[ShapeSource], Vec<Input>),
+    request: &ArrayRequest,
+    physics: &ArrayPhysics,
+    (before, found, around): (&Before, &Found<'_>, Option<Study>),
+) -> Result<ArrayOptimization, RunError> {
+    let Candidate {
+        x,
+        physical,
+        bounds,
+        level,
+    } = &found.best;
+    let given = match level {
+        Level::Search => &before.search,
+        Level::Full => &before.full,
+    };
+    let gains = physical.lambda_n_per_m.iter().zip(&given.lambda_n_per_m);
+    let ratios: Vec<f64> = gains.map(|(now, before)| now / before).collect();
+    let shape = |(index, source): (usize, &ShapeSource)| ShapeGain {
+        shape: source.document.name.clone(),
+        lambda_before_n_per_m: given.lambda_n_per_m[index],
+        lambda_n_per_m: physical.lambda_n_per_m[index],
+        gain: ratios[index],
+    };
+    let axes = found.problem.space.axes().iter().map(|axis| axis.key());
+    let search = &found.search;
+    let objective = |x: &Vec<f64>| {
+        let sample = search.samples().iter().find(|sample| sample.x == *x)?;
+        Some(search.judged(sample)?.objective().exp())
+    };
+    let (design_text, best) = written(document, found)?;
+    let mut warnings = Vec::new();
+    let (limits, limits_met) = match found.interrupted {
+        // Nothing more is computed then.
+        true => (
+            BTreeMap::new(),
+            bounds.iter().all(|bound| bound.excess() <= 0.0),
+        ),
+        false => {
+            let evaluation = evaluate(&best, Vec::new(), request.tolerance)?;
+            let met = evaluation.limits_met();
+            warnings.extend(evaluation.warnings);
+            (evaluation.limits, met)
+        }
+    };
+    let limits_given = match found.interrupted {
+        true => BTreeMap::new(),
+        false => evaluate(document.design, Vec::new(), request.tolerance)?.limits,
+    };
+    let status = match (found.interrupted, limits_met) {
+        (true, _) => ArrayEnding::Interrupted,
+        (false, true) => ArrayEnding::Done,
+        (false, false) => ArrayEnding::Infeasible,
+    };
+    Ok(ArrayOptimization {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        design: document.design.name.clone(),
+        inputs,
+        status,
+        constant: request.constant,
+        objective: if request.shares.is_some() {
+            "mean"
+        } else {
+            "smallest"
+        },
+        gain: together(&ratios, request.shares.as_deref()),
+        shapes: shapes.iter().enumerate().map(shape).collect(),
+        values: axes.zip(x.iter().copied()).collect(),
+        limits,
+        limits_given,
+        limits_met,
+        study: around,
+        certificate: ArrayCertificate {
+            kind: "multistart",
+            starts: search.ends().len(),
+            ends: search.ends().iter().filter_map(objective).collect(),
+        },
+        levels: levels(physics, document.design, (before, found))?,
+        evaluations: found.evaluations,
+        choices: found.choices,
+        seed: request.settings.seed,
+        design_text,
+        warnings,
+    })
+}
+
+/// One number of the shapes' ratios.
+fn together(ratios: &[f64], shares: Option<&[f64]>) -> f64 {
+    match shares {
+        None => ratios.iter().copied().fold(f64::INFINITY, f64::min),
+        Some(shares) => {
+            let sum: f64 = ratios.iter().zip(shares).map(|(r, s)| s * r.ln()).sum();
+            (sum / shares.iter().sum::<f64>()).exp()
+        }
+    }
+}
+
+/// How far force constants at the level of the search are from full accuracy, and their ratios.
+fn levels(
+    physics: &ArrayPhysics,
+    design: &Design,
+    (before, found): (&Before, &Found<'_>),
+) -> Result<Vec<LevelSummary>, RunError> {
+    let best = &found.best;
+    let tolerance = |level| -> Result<f64, RunError> {
+        Ok(Scene::with_tolerance(design, physics.tolerance(level))?
+            .tolerances
+            .forces)
+    };
+    let mut levels = vec![LevelSummary {
+        level: "full",
+        tolerance: tolerance(Level::Full)?,
+        points: physics.count(Level::Full),
+        lambda_error: 0.0,
+        gain_error: 0.0,
+    }];
+    let made = &found.problem.space;
+    let coarse = match best.level {
+        Level::Full => {
+            physics.compute(&made.design(&best.x), made.raised_m(&best.x), Level::Search)?
+        }
+        Level::Search => None,
+    };
+    if let Some(coarse) = coarse {
+        let ratios = |a: &Physical, b: &Physical| -> Vec<f64> {
+            a.lambda_n_per_m
+                .iter()
+                .zip(&b.lambda_n_per_m)
+                .map(|(a, b)| a / b)
+                .collect()
+        };
+        let (given, now) = (
+            ratios(&before.search, &before.full),
+            ratios(&coarse, &best.physical),
+        );
+        let most = |values: Vec<f64>| {
+            values
+                .iter()
+                .fold(0.0_f64, |most, r| most.max((r - 1.0).abs()))
+        };
+        levels.insert(
+            0,
+            LevelSummary {
+                level: "search",
+                tolerance: tolerance(Level::Search)?,
+                points: physics.count(Level::Search),
+                gain_error: most(now.iter().zip(&given).map(|(a, b)| a / b).collect()),
+                lambda_error: most(now.into_iter().chain(given).collect()),
+            },
+        );
+    }
+    Ok(levels)
+}
+
+/// The best array as a document, and what is read of it.
+fn written(document: &Document<'_>, found: &Found<'_>) -> Result<(String, Design), RunError> {
+    let (set, remove) = found.problem.space.settings(&found.best.x);
+    let mut template = Template::new(document.text, document.path)
+        .map_err(|error| RunError::Input(error.to_string()))?;
+    remove.into_iter().for_each(|key| template.remove(key));
+    let name = toml::Value::String(format!("{}_array", document.design.name));
+    let settings = std::iter::once(("name", name)).chain(set);
+    let text = template.with(settings).map_err(RunError::Input)?;
+    let (design, _) =
+        Design::from_toml(&text, document.path, Need::EVALUATE).map_err(|refused| {
+            RunError::Input(format!(
+                "the best array makes no design of its own: {refused}"
+            ))
+        })?;
+    Ok((text, design))
+}

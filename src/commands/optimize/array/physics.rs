@@ -1,0 +1,338 @@
+//! What a design of the search renders: forces at the shapes' points through the coupled steel.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use serde::Serialize;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+use crate::RunError;
+use crate::coil::array_search::problem::{Level, Physical, Physics};
+use crate::commands::discretize;
+use crate::commands::lambda::WantedPoints;
+use crate::design::Design;
+use crate::force_direction::RequestedForce;
+use crate::lambda::feedback::{Span, reachable};
+use crate::lambda::vector_feedback::{VectorProblem, reachable_vectors};
+use crate::lambda::{Criterion, ForceProblem, Settings, constant};
+use crate::point_weights::Weights;
+use crate::progress::{Interrupted, Progress, Silent, interruptible};
+use crate::scene::single::Single;
+use crate::scene::sources::ShapeSource;
+use crate::scene::{Scene, passive, steel};
+
+/// The force constant that is made as large as possible.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum Constant {
+    /// Where the first limit binds
+    Linear,
+    /// The largest at which limits add less than a just-noticeable difference
+    #[default]
+    Jnd,
+    /// Beyond it no current changes
+    Saturation,
+    /// The largest with no point too weak
+    Maxmin,
+    /// The largest with currents of their own at every point
+    Feedback,
+    /// The same for the force vector, nothing sideways
+    Vector,
+}
+
+impl Constant {
+    /// The static constant, where it is one.
+    fn criterion(self) -> Option<Criterion> {
+        match self {
+            Self::Linear => Some(Criterion::Linear),
+            Self::Jnd => Some(Criterion::Jnd),
+            Self::Saturation => Some(Criterion::Saturation),
+            Self::Maxmin => Some(Criterion::Maxmin),
+            Self::Feedback | Self::Vector => None,
+        }
+    }
+}
+
+/// What was computed, by a digest of the design.
+pub type Journal = BTreeMap<String, Option<Physical>>;
+
+/// Samples of a shape along one axis while searching.
+const SEARCH_SAMPLES: usize = 31;
+/// Tolerance of the forces while searching.
+pub const SEARCH_TOLERANCE: f64 = 1e-2;
+
+/// The shapes over arrays of any design.
+pub struct ArrayPhysics<'a> {
+    constant: Constant,
+    jnd_weight: f64,
+    tolerance: Option<f64>,
+    /// Points of every shape, while searching and in the end.
+    coarse: Vec<WantedPoints>,
+    fine: Vec<WantedPoints>,
+    progress: &'a dyn Progress,
+    /// Evaluations reported.
+    reported: AtomicUsize,
+    /// What was computed before, in this run or an earlier one.
+    known: Mutex<Journal>,
+}
+
+impl<'a> ArrayPhysics<'a> {
+    /// The points of `shapes`, for one of their force constants.
+    ///
+    /// # Errors
+    /// A shape that gives no points; interruption.
+    pub fn new(
+        shapes: &[ShapeSource],
+        (constant, jnd_weight): (Constant, f64),
+        tolerance: Option<f64>,
+        progress: &'a dyn Progress,
+    ) -> Result<Self, RunError> {
+        let points = |most: usize| -> Result<Vec<WantedPoints>, RunError> {
+            let of = |shape: &ShapeSource| {
+                let document = &shape.document;
+                let samples =
+                    [document.grid.x, document.grid.y].map(|axis| axis.samples().min(most));
+                let report = discretize::run(&document.with_samples(samples), Vec::new(), &Silent)?;
+                let weights = report.weights.unwrap_or(Weights::Equal);
+                Ok(WantedPoints::of_grid(&report, weights))
+            };
+            shapes.iter().map(of).collect()
+        };
+        Ok(Self {
+            constant,
+            jnd_weight,
+            tolerance,
+            coarse: points(SEARCH_SAMPLES)?,
+            fine: points(usize::MAX)?,
+            progress,
+            reported: AtomicUsize::new(0),
+            known: Mutex::default(),
+        })
+    }
+
+    fn points(&self, level: Level) -> &[WantedPoints] {
+        match level {
+            Level::Search => &self.coarse,
+            Level::Full => &self.fine,
+        }
+    }
+
+    /// Points of all shapes at a level.
+    pub fn count(&self, level: Level) -> usize {
+        self.points(level)
+            .iter()
+            .map(|points| points.height_m.len())
+            .sum()
+    }
+
+    /// The lowest point of all shapes, m.
+    pub fn lowest_m(&self) -> f64 {
+        let lowest = self.fine.iter().map(WantedPoints::lowest_m);
+        lowest.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The tolerance of a level's forces; `None` for the default of the design's physics.
+    pub fn tolerance(&self, level: Level) -> Option<f64> {
+        match level {
+            Level::Search => Some(
+                self.tolerance
+                    .unwrap_or(SEARCH_TOLERANCE)
+                    .max(SEARCH_TOLERANCE),
+            ),
+            Level::Full => self.tolerance,
+        }
+    }
+
+    /// What the design renders; `None` where it renders nothing for some shape.
+    ///
+    /// # Errors
+    /// A design that cannot be computed; interruption.
+    pub fn rendered(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, RunError> {
+        let scene = Scene::with_tolerance(design, self.tolerance(level))?;
+        let points = self.points(level);
+        let raised = |points: &WantedPoints| -> Vec<[f64; 3]> {
+            points
+                .positions_m
+                .iter()
+                .map(|[x, y, z]| [*x, *y, z + raised_m])
+                .collect()
+        };
+        let positions: Vec<[f64; 3]> = points.iter().flat_map(raised).collect();
+        let lowest_m = positions.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
+        let coils = scene.coils.len();
+        let sides = match self.constant {
+            Constant::Vector => Some(scene.force_vectors_n_per_a(&solved, &positions, &Silent)?),
+            Constant::Linear
+            | Constant::Jnd
+            | Constant::Saturation
+            | Constant::Maxmin
+            | Constant::Feedback => None,
+        };
+        let forces = match &sides {
+            Some(vectors) => vectors.iter().map(|force| force[2]).collect(),
+            None => scene.forces_n_per_a(&solved, &positions, &Silent)?,
+        };
+        let pull = match design.magnet.passive_force {
+            true => {
+                passive::pull(&scene, &positions, false)?.map(|pull| pull.forces_z_n(&positions))
+            }
+            false => None,
+        };
+        let resistance_ohm = scene.resistances_ohm();
+        let (mut lambda_n_per_m, mut first) = (Vec::new(), 0);
+        for points in points {
+            let rows = first..first + points.height_m.len();
+            first = rows.end;
+            let height_m: Vec<f64> = positions[rows.clone()].iter().map(|p| p[2]).collect();
+            let problem = ForceProblem {
+                forces_n_per_a: &forces[rows.start * coils..rows.end * coils],
+                height_m: &height_m,
+                offset_n: pull.as_ref().map(|pull| &pull[rows.clone()]),
+                weights: points.weights(),
+                lower_a: &scene.lower_a,
+                upper_a: &scene.upper_a,
+                total_max_a: design.supply.total_current_max_a,
+                resistance_ohm: &resistance_ohm,
+            };
+            let vectors = sides
+                .as_ref()
+                .map(|all| &all[rows.start * coils..rows.end * coils]);
+            match self.lambda(&problem, vectors, points)? {
+                Some(lambda) if lambda > 0.0 => lambda_n_per_m.push(lambda),
+                _ => return Ok(None),
+            }
+        }
+        let single = Single::new(&scene)?;
+        let added = |coil: usize| solved.steel().added_inductance_h(coil, coil);
+        let of_array = (0..coils).map(|coil| scene.circuit.inductance_h + added(coil));
+        let array_inductance_h = match crate::scene::coupled(design) {
+            true => of_array.fold(0.0, f64::max),
+            false => single.inductance_h,
+        };
+        Ok(Some(Physical {
+            lambda_n_per_m,
+            inductance_h: single.inductance_h,
+            array_inductance_h,
+            core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
+        }))
+    }
+
+    fn lambda(
+        &self,
+        problem: &ForceProblem,
+        vectors: Option<&[[f64; 3]]>,
+        points: &WantedPoints,
+    ) -> Result<Option<f64>, RunError> {
+        if let Some(criterion) = self.constant.criterion() {
+            let settings = Settings {
+                criterion,
+                jnd_weight: self.jnd_weight,
+                at_n_per_m: None,
+            };
+            return Ok(constant(problem, &settings)?);
+        }
+        let mut span = Span::default();
+        let reach = match vectors {
+            None => reachable(problem)?,
+            Some(vectors) => {
+                let [x, y] =
+                    [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect::<Vec<f64>>());
+                let direction = points.directions(RequestedForce::default());
+                let vector = VectorProblem {
+                    upward: *problem,
+                    sides_n_per_a: [&x, &y],
+                    direction: &direction,
+                };
+                reachable_vectors(&vector).map_err(|error| RunError::Input(error.to_string()))?
+            }
+        };
+        span.add(problem.height_m, &reach);
+        Ok(span.largest().ok().map(|largest| largest.lambda_n_per_m))
+    }
+
+    /// What was computed, to be known to a later run.
+    pub fn journal(&self) -> Journal {
+        self.known
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    /// Takes what an earlier run computed.
+    pub fn remember(&self, journal: Journal) {
+        *self.known.lock().unwrap_or_else(PoisonError::into_inner) = journal;
+    }
+}
+
+impl Physics for ArrayPhysics<'_> {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        self.progress.check()?;
+        // Debug text holds every number to the last bit.
+        let key = format!(
+            "{level:?} {raised_m:?} {:?}",
+            (
+                &design.coil,
+                &design.wire,
+                &design.core,
+                &design.array,
+                &design.magnet
+            )
+        );
+        let key = crate::bundle::artefact::sha256_hex(key.as_bytes());
+        let known = self
+            .known
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(&key)
+            .cloned();
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let computed = interruptible(|| self.rendered(design, raised_m, level))?;
+        let computed = match computed {
+            Ok(physical) => physical,
+            Err(RunError::Interrupted(interrupted)) => return Err(interrupted),
+            // A design of the search that cannot be computed is none.
+            Err(_) => None,
+        };
+        self.known
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(key, computed.clone());
+        Ok(computed)
+    }
+
+    fn report(&self, evaluations: usize, best: Option<f64>) {
+        let before = self.reported.fetch_max(evaluations, Ordering::Relaxed);
+        self.progress
+            .advance(evaluations.saturating_sub(before) as u64);
+        if let Some(best) = best {
+            self.progress.improved(best, "x");
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The trade-offs of `optimize --for` as a table and a drawing.
+
+use super::ArrayOptimization;
+use crate::coil::array_search::study::TRADED;
+use crate::coil::limits::LimitName;
+use crate::plot::pareto::{Panel, ParetoPlot};
+
+/// One row a point: quantity, its value, the gain, and every variable.
+pub fn csv(result: &ArrayOptimization) -> String {
+    let points = result.study.as_ref().map_or(&[][..], |study| &study.front);
+    let keys: Vec<&str> = result.values.keys().map(String::as_str).collect();
+    let mut text = format!("quantity,value,gain,{}\n", keys.join(","));
+    for point in points {
+        let value = |key: &&str| {
+            point
+                .values
+                .get(*key)
+                .map_or_else(String::new, f64::to_string)
+        };
+        let values: Vec<String> = keys.iter().map(value).collect();
+        text.push_str(&format!(
+            "{},{},{},{}\n",
+            point.quantity,
+            point.value,
+            point.objective,
+            values.join(",")
+        ));
+    }
+    text
+}
+
+/// Gain against mass, heat and settling of the whole array; `None` where these were not studied.
+pub fn svg(result: &ArrayOptimization) -> Option<String> {
+    let study = result.study.as_ref()?;
+    let panel = |cost: usize| {
+        let (_, name): (_, LimitName) = TRADED[cost];
+        let limit = name.limit();
+        Panel {
+            name: limit.label,
+            unit: limit.written.0,
+            values: study
+                .designs
+                .iter()
+                .map(|design| design.costs[cost] * limit.written.1)
+                .collect(),
+            front: study.on_front[cost].clone(),
+        }
+    };
+    let plot = ParetoPlot {
+        title: format!("{}: force constants against their cost", result.design),
+        gain: "force constants, relative",
+        gain_unit: "",
+        gains: study
+            .designs
+            .iter()
+            .map(|design| design.objective)
+            .collect(),
+        limits_met: study.designs.iter().map(|design| design.met).collect(),
+        front: "computed arrays that no other one beats",
+        panels: std::array::from_fn(panel),
+    };
+    Some(plot.svg())
+}

@@ -1,0 +1,193 @@
+//! The summary of `optimize --for`.
+
+use super::{ArrayEnding, ArrayOptimization};
+use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::limits::limit_row;
+use crate::cli::quantity::{count, number, percent, si};
+use crate::cli::values::FileArgument;
+use crate::coil::array_search::study::{LimitWorth, Study};
+
+pub fn summary(
+    result: &ArrayOptimization,
+    out: Option<&FileArgument>,
+    seconds: &[(String, f64)],
+) -> String {
+    let mut sheet = Sheet::new(&format!("{}: the array that is felt best", result.design));
+    let whole = if result.shapes.len() == 1 {
+        ""
+    } else {
+        result.objective
+    };
+    sheet.line(
+        "gain",
+        &format!("{} times the given design's {whole}", number(result.gain)),
+    );
+    sheet.line("ended", &ended(result));
+    if let Some(FileArgument::Path(path)) = out {
+        sheet.line("written to", &path.display().to_string());
+    }
+    let took: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
+    sheet.line("took", &si(took, "s"));
+    if let Some(search) = result.levels.iter().find(|level| level.level == "search") {
+        let error = format!(
+            "while searching force constants were {} off at most, their ratios {}",
+            percent(search.lambda_error),
+            percent(search.gain_error)
+        );
+        sheet.line("accuracy", &error);
+    }
+    if let Some(study) = &result.study {
+        worth(&mut sheet, study);
+    }
+    sheet.gap();
+    sheet.raw(&shapes(result));
+    sheet.gap();
+    sheet.raw(&variables(result));
+    if !result.limits.is_empty() {
+        sheet.gap();
+        sheet.raw(&limits(result));
+    }
+    if let Some(study) = result
+        .study
+        .as_ref()
+        .filter(|study| !study.neighbours.is_empty())
+    {
+        sheet.gap();
+        sheet.raw(&neighbours(result, study));
+    }
+    sheet.finish()
+}
+
+fn ended(result: &ArrayOptimization) -> String {
+    let searched = format!(
+        "best of {} over {} that were computed; nothing is proven",
+        count(result.certificate.starts.max(1), "descent"),
+        count(result.evaluations, "array")
+    );
+    match result.status {
+        ArrayEnding::Done => searched,
+        ArrayEnding::Infeasible => format!("{searched}; none meets every limit"),
+        ArrayEnding::Interrupted => {
+            format!("interrupted: {searched}, at the accuracy of the search")
+        }
+    }
+}
+
+fn worth(sheet: &mut Sheet, study: &Study) {
+    let said: Vec<String> = study
+        .limits
+        .iter()
+        .filter(|limit| limit.active)
+        .map(one_more)
+        .collect();
+    if !said.is_empty() {
+        sheet.line("worth", &said.join("\n"));
+    }
+}
+
+/// What a step more of a limit would give.
+fn one_more(limit: &LimitWorth) -> String {
+    let (unit, per_si) = match limit.name {
+        Some(name) => name.limit().step,
+        None if limit.key.ends_with("_m") => ("mm", 1e3),
+        None => ("mm", 1.0),
+    };
+    let label = crate::cli::limits::label(limit.key);
+    let given = percent(limit.gain_per_unit.abs() / per_si);
+    let way = if limit.gain_per_unit < 0.0 {
+        "less"
+    } else {
+        "more"
+    };
+    format!("1 {unit} {way} of {label} would give {given}")
+}
+
+fn shapes(result: &ArrayOptimization) -> String {
+    let head = ["shape", "before", "lambda", "gain"]
+        .map(str::to_owned)
+        .to_vec();
+    let row = |shape: &super::ShapeGain| {
+        vec![
+            shape.shape.clone(),
+            format!("{} N/m", number(shape.lambda_before_n_per_m)),
+            format!("{} N/m", number(shape.lambda_n_per_m)),
+            number(shape.gain),
+        ]
+    };
+    let rows: Vec<_> = std::iter::once(head)
+        .chain(result.shapes.iter().map(row))
+        .collect();
+    table(&[Side::Left, Side::Right, Side::Right, Side::Right], &rows)
+}
+
+fn variables(result: &ArrayOptimization) -> String {
+    let Some(study) = &result.study else {
+        let rows: Vec<_> = result
+            .values
+            .iter()
+            .map(|(key, value)| vec![key.clone(), number(*value)])
+            .collect();
+        return table(&[Side::Left, Side::Right], &rows);
+    };
+    let head = ["variable", "given", "best", "within 1 %", "bought"]
+        .map(str::to_owned)
+        .to_vec();
+    let rows = study.variables.iter().map(|one| {
+        let bought = one.objective_without.map_or_else(
+            || "needed".to_owned(),
+            |without| percent((result.gain / without - 1.0).max(0.0)),
+        );
+        let [low, high] = one.range.map(number);
+        vec![
+            one.key.clone(),
+            number(one.given),
+            number(one.value),
+            format!("{low} to {high}"),
+            bought,
+        ]
+    });
+    let rows: Vec<_> = std::iter::once(head).chain(rows).collect();
+    table(
+        &[
+            Side::Left,
+            Side::Right,
+            Side::Right,
+            Side::Right,
+            Side::Right,
+        ],
+        &rows,
+    )
+}
+
+fn limits(result: &ArrayOptimization) -> String {
+    let rows = result.limits.iter().map(|(key, check)| {
+        let state = if check.met { "met" } else { "missed" };
+        let before = result.limits_given.get(key).filter(|check| !check.met);
+        let state = before.map_or_else(|| state.to_owned(), |_| format!("{state}, missed before"));
+        limit_row(key, check.value, check.limit, &state)
+    });
+    table(
+        &[Side::Left, Side::Right, Side::Right, Side::Left],
+        &rows.collect::<Vec<_>>(),
+    )
+}
+
+fn neighbours(result: &ArrayOptimization, study: &Study) -> String {
+    let rows = study.neighbours.iter().map(|near| {
+        let lost = percent((1.0 - near.objective / result.gain).max(0.0));
+        let values: Vec<String> = near
+            .values
+            .iter()
+            .map(|(key, value)| format!("{key} = {}", number(*value)))
+            .collect();
+        vec![
+            near.what.clone(),
+            format!("loses {lost}"),
+            values.join(", "),
+        ]
+    });
+    table(
+        &[Side::Left, Side::Left, Side::Left],
+        &rows.collect::<Vec<_>>(),
+    )
+}

@@ -1,0 +1,270 @@
+//! `[search]`: what `optimize --for` may vary, each key as the design names it.
+//!
+//! Two numbers are a range, one or more than two a list of choices. Keys that only a list makes sense
+//! for (wires, rows, magnets) take lists of any length.
+
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+use super::reader::Section;
+use super::rule::{BODY_MM, Bound, Rule};
+use super::sections::{MAGNET_MM, OFFSET_MM, WIRE_MM};
+
+/// A key that may be searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SearchKey {
+    /// `coil.inner_diameter_mm`.
+    InnerDiameter,
+    /// `coil.outer_diameter_mm`.
+    OuterDiameter,
+    /// `coil.length_mm`.
+    Length,
+    /// `wire.diameter_mm`.
+    Wire,
+    /// `core.clearance_mm`.
+    Clearance,
+    /// `core.above_mm`.
+    Above,
+    /// `core.below_mm`.
+    Below,
+    /// `array.pitch_mm`.
+    Pitch,
+    /// `array.rows`.
+    Rows,
+    /// `array.columns`.
+    Columns,
+    /// `array.move_mm`: how far coils may move along x and y.
+    Move,
+    /// `shapes.height_mm`: how far the shapes are raised.
+    Height,
+}
+
+/// The values that a key may have, in its own unit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SearchValues {
+    /// All of these and between, the first below the second.
+    Range([f64; 2]),
+    /// One of these, rising.
+    Listed(Vec<f64>),
+}
+
+impl SearchValues {
+    /// The least and the largest.
+    #[must_use]
+    pub fn ends(&self) -> [f64; 2] {
+        match self {
+            Self::Range(ends) => *ends,
+            Self::Listed(list) => [list[0], list[list.len() - 1]],
+        }
+    }
+}
+
+/// Which coils move alike.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
+pub enum Symmetry {
+    /// Those that the symmetries of a square map to each other.
+    #[default]
+    Square,
+    /// Those that lie mirrored about the x or the y axis.
+    Mirrored,
+    /// None: every coil by itself.
+    Free,
+}
+
+/// How the coils of an array lie.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
+pub enum SearchLayout {
+    /// Rows and columns.
+    Grid,
+    /// Every other row shifted by half a pitch, rows closer together: neighbours on triangles.
+    Shifted,
+    /// One coil in the centre, the others on a ring whose radius is the pitch at least.
+    Ring,
+}
+
+/// `[search]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SearchSpace {
+    /// The keys that vary, each once.
+    pub keys: Vec<(SearchKey, SearchValues)>,
+    /// Layouts to choose from; empty: as given.
+    pub layouts: Vec<SearchLayout>,
+    /// Magnets to choose from, diameter and length, mm; empty: as given.
+    pub magnets_mm: Vec<[f64; 2]>,
+    /// Which coils move alike.
+    pub symmetry: Symmetry,
+    /// Whether a coil without a core is tried too.
+    pub without_core: bool,
+}
+
+impl SearchSpace {
+    /// The values of a key that varies.
+    #[must_use]
+    pub fn values(&self, key: SearchKey) -> Option<&SearchValues> {
+        self.keys
+            .iter()
+            .find(|(known, _)| *known == key)
+            .map(|(_, values)| values)
+    }
+}
+
+const COUNT: Rule = Rule::any("").bound(Bound::AtLeast(1.0));
+
+/// Reads the section.
+pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
+    let mut space = SearchSpace::default();
+    let body = BODY_MM.positive();
+    let mut coil = s.section("coil");
+    add(
+        &mut space,
+        &mut coil,
+        SearchKey::InnerDiameter,
+        "inner_diameter_mm",
+        &body,
+    );
+    add(
+        &mut space,
+        &mut coil,
+        SearchKey::OuterDiameter,
+        "outer_diameter_mm",
+        &body,
+    );
+    add(&mut space, &mut coil, SearchKey::Length, "length_mm", &body);
+    coil.finish();
+    let mut wire = s.section("wire");
+    add(
+        &mut space,
+        &mut wire,
+        SearchKey::Wire,
+        "diameter_mm",
+        &WIRE_MM.positive(),
+    );
+    wire.finish();
+    let mut core = s.section("core");
+    add(
+        &mut space,
+        &mut core,
+        SearchKey::Clearance,
+        "clearance_mm",
+        &OFFSET_MM.bound(Bound::NotNegative),
+    );
+    add(
+        &mut space,
+        &mut core,
+        SearchKey::Above,
+        "above_mm",
+        &OFFSET_MM,
+    );
+    add(
+        &mut space,
+        &mut core,
+        SearchKey::Below,
+        "below_mm",
+        &OFFSET_MM,
+    );
+    space.without_core = core.flag_or("none", false);
+    core.finish();
+    let mut array = s.section("array");
+    add(&mut space, &mut array, SearchKey::Pitch, "pitch_mm", &body);
+    add(&mut space, &mut array, SearchKey::Rows, "rows", &COUNT);
+    add(
+        &mut space,
+        &mut array,
+        SearchKey::Columns,
+        "columns",
+        &COUNT,
+    );
+    add(
+        &mut space,
+        &mut array,
+        SearchKey::Move,
+        "move_mm",
+        &OFFSET_MM,
+    );
+    space.layouts = array.choices("layout");
+    space.symmetry = array.choice("symmetry").unwrap_or_default();
+    array.finish();
+    let mut magnet = s.section("magnet");
+    let sizes = magnet.pairs("size_mm", &MAGNET_MM.positive(), MAGNETS_MAX);
+    space.magnets_mm = sizes
+        .unwrap_or_default()
+        .iter()
+        .map(|size| size.value)
+        .collect();
+    magnet.finish();
+    let mut shapes = s.section("shapes");
+    add(
+        &mut space,
+        &mut shapes,
+        SearchKey::Height,
+        "height_mm",
+        &OFFSET_MM,
+    );
+    shapes.finish();
+    s.finish();
+    space
+}
+
+/// Most magnets to choose from.
+const MAGNETS_MAX: usize = 100;
+
+impl SearchKey {
+    /// Whether two values are two choices, not the ends of a range.
+    fn is_listed(self) -> bool {
+        match self {
+            Self::Wire | Self::Rows | Self::Columns => true,
+            Self::InnerDiameter
+            | Self::OuterDiameter
+            | Self::Length
+            | Self::Clearance
+            | Self::Above
+            | Self::Below
+            | Self::Pitch
+            | Self::Move
+            | Self::Height => false,
+        }
+    }
+}
+
+fn add(
+    space: &mut SearchSpace,
+    s: &mut Section<'_>,
+    key: SearchKey,
+    name: &'static str,
+    rule: &Rule,
+) {
+    let Some(given) = s.numbers(name, rule) else {
+        return;
+    };
+    let mut list = given.value;
+    if list.is_empty() || list.iter().any(|value| value.is_nan()) {
+        return;
+    }
+    if let ([low, high], false) = (&list[..], key.is_listed()) {
+        if low < high {
+            space.keys.push((key, SearchValues::Range([*low, *high])));
+        } else {
+            let message = format!("the range from {low} to {high} holds no values");
+            s.fault(
+                name,
+                message,
+                "write the lower end first; one value alone fixes the key",
+            );
+        }
+        return;
+    }
+    if matches!(key, SearchKey::Rows | SearchKey::Columns) && list.iter().any(|v| v.fract() != 0.0)
+    {
+        s.fault(name, "expected whole numbers", "as in rows = [3, 4, 5]");
+    }
+    list.sort_by(f64::total_cmp);
+    if list.windows(2).any(|pair| pair[0] == pair[1]) {
+        s.fault(name, "a choice is there twice", "give each value once");
+    }
+    space.keys.push((key, SearchValues::Listed(list)));
+}

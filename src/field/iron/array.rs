@@ -1,0 +1,566 @@
+//! Windings among steel of any shape, solved.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::bodies::{Coils, Iron};
+use super::face::{Node, Point};
+use super::surface::{Surface, mirrored};
+use super::system::System;
+use crate::components::Components;
+use crate::frame::to_cartesian;
+use crate::source::AxialSource;
+use crate::steel::array::CoupledArray;
+use crate::steel::array_steel::{ArraySteel, DirectField, SteelField};
+use crate::steel::equivalent_dipoles::ArraySources;
+use crate::winding::{OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::vec3::{dot, minus, norm};
+
+/// Resolutions from coarse to fine: order, panels a turn, steps to an edge, panels along the largest
+/// body.
+const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
+    (3, 4, 1, 5.0),
+    (3, 4, 2, 6.0),
+    (4, 4, 2, 7.0),
+    (4, 4, 3, 8.0),
+    (5, 6, 4, 9.0),
+    (6, 8, 6, 12.0),
+];
+/// Most entries of the dense matrices (1.6 GB).
+const MOST_ENTRIES: usize = 200_000_000;
+/// Share of the tolerance given to the linear solver.
+const SOLVER_SHARE: f64 = 0.02;
+/// Accuracy of the windings' potential, relative to one face's.
+const POTENTIAL: f64 = 1e-9;
+
+/// How the error of a solution is known.
+pub const TWO_OF_IRON: &str = "the difference of two resolutions of the steel's surface";
+
+/// The solved steel, per ampere of every winding.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct IronArray {
+    /// Axes of the windings, m.
+    pub positions_m: Vec<[f64; 2]>,
+    /// The winding of every coil.
+    pub winding: Winding,
+    surface: Surface,
+    /// Signs of the mirrored copies of the surface, and the planes.
+    images: Vec<[f64; 2]>,
+    planes_m: [f64; 2],
+    /// [image][node][drive], A/A.
+    layers: Vec<Vec<f64>>,
+    top_m: f64,
+    /// Steel's part of self and mutual inductances, [coil, drive], H.
+    pub added_inductance_h: DMatrix<f64>,
+    /// Estimated error of gradients and inductances, relative to the largest: the difference from the next
+    /// coarser resolution.
+    pub relative_error: f64,
+    /// Relative residual of the linear solver.
+    pub relative_residual: f64,
+    /// Applications of the matrices.
+    pub iterations: usize,
+}
+
+impl IronArray {
+    /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as memory allows:
+    /// [`IronArray::relative_error`] says what was reached.
+    ///
+    /// # Errors
+    /// A node on a winding's edge.
+    pub fn new(
+        coils: Coils<'_>,
+        iron: &Iron,
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, OnEdge> {
+        let first = (-tolerance.log10().round()).clamp(1.0, 5.0) as usize - 1;
+        let mut coarse = Self::at_resolution(coils, iron, tolerance, first)?;
+        for (tier, resolution) in RESOLUTIONS.iter().enumerate().skip(first + 1) {
+            let surface = Surface::new(iron.part(), &iron.resolution(*resolution));
+            if iron.images().len() * surface.size().pow(2) > MOST_ENTRIES {
+                break;
+            }
+            let mut fine = Self::at_resolution(coils, iron, tolerance, tier)?;
+            fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
+            coarse = fine;
+            if coarse.relative_error <= tolerance {
+                break;
+            }
+        }
+        Ok(coarse)
+    }
+
+    /// Solves at one of the resolutions, 0 to 6.
+    ///
+    /// # Errors
+    /// A node on a winding's edge.
+    pub fn at_resolution(
+        Coils {
+            winding,
+            positions_m,
+            ..
+        }: Coils<'_>,
+        iron: &Iron,
+        tolerance: f64,
+        tier: usize,
+    ) -> Result<Self, OnEdge> {
+        let resolution = iron.resolution(RESOLUTIONS[tier]);
+        let surface = Surface::new(iron.part(), &resolution);
+        let images = iron.images();
+        let planes_m = iron.planes_m;
+        let system = System::new(iron, &surface, &images);
+        let drives: Vec<Drive> = drives(positions_m, &images, planes_m);
+        let firsts: Vec<usize> = (0..drives.len())
+            .filter(|d| {
+                drives[*d]
+                    == Drive {
+                        first: *d,
+                        image: 0,
+                    }
+            })
+            .collect();
+        let node_at = |image: usize, node: &Node| mirrored(node, images[image], planes_m);
+        // The windings' potential at every node of every image.
+        let potentials: Vec<DMatrix<f64>> = (0..images.len())
+            .map(|image| {
+                let columns: Vec<f64> = firsts
+                    .iter()
+                    .flat_map(|drive| {
+                        let [x, y] = positions_m[*drive];
+                        let of_node = |(number, node): (usize, &Node)| {
+                            let [px, py, pz] = node_at(image, node).place_m;
+                            let bore = surface.face_of(number).bore;
+                            let in_bore = bore.is_some_and(|own| {
+                                moved(positions_m, own, images[image], planes_m) == *drive
+                            });
+                            winding.potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
+                        };
+                        surface
+                            .nodes
+                            .par_iter()
+                            .enumerate()
+                            .map(of_node)
+                            .collect::<Vec<f64>>()
+                    })
+                    .collect();
+                DMatrix::from_vec(surface.size(), firsts.len(), columns)
+            })
+            .collect();
+        let solved = system.solve(&potentials, SOLVER_SHARE * tolerance);
+        // Every drive from the first of its like.
+        let count = drives.len();
+        let layers: Vec<Vec<f64>> = (0..images.len())
+            .map(|image| {
+                let mut out = vec![0.0; surface.size() * count];
+                for (number, drive) in drives.iter().enumerate() {
+                    let column = firsts.iter().position(|f| *f == drive.first);
+                    let column = column.expect("a drive has a first of its like");
+                    let values = solved.layers[image ^ drive.image].column(column);
+                    for (row, value) in out.chunks_exact_mut(count).zip(values.iter()) {
+                        row[number] = *value;
+                    }
+                }
+                out
+            })
+            .collect();
+        let mut array = Self {
+            positions_m: positions_m.to_vec(),
+            winding,
+            surface,
+            images,
+            planes_m,
+            layers,
+            top_m: iron.top_m(),
+            added_inductance_h: DMatrix::zeros(count, count),
+            relative_error: f64::NAN,
+            relative_residual: solved.residual,
+            iterations: solved.iterations,
+        };
+        array.add_inductances(&firsts)?;
+        Ok(array)
+    }
+
+    /// Flux through coil i: -mu_0 int v n.H_i dS.
+    fn add_inductances(&mut self, firsts: &[usize]) -> Result<(), OnEdge> {
+        let count = self.positions_m.len();
+        for coil in firsts {
+            let [x, y] = self.positions_m[*coil];
+            let mut row = vec![0.0; count];
+            for (image, layers) in self.layers.iter().enumerate() {
+                let fluxes = self
+                    .surface
+                    .nodes
+                    .par_iter()
+                    .map(|node| {
+                        let node = mirrored(node, self.images[image], self.planes_m);
+                        let [px, py, pz] = node.place_m;
+                        let (dx, dy) = (px - x, py - y);
+                        let field = self.winding.field(dx.hypot(dy), pz)?;
+                        let b = to_cartesian(&field, dx, dy).field_t_per_a;
+                        Ok(dot(b, node.area_m2))
+                    })
+                    .collect::<Result<Vec<f64>, OnEdge>>()?;
+                for (layer, flux) in layers.chunks_exact(count).zip(fluxes) {
+                    for (sum, layer) in row.iter_mut().zip(layer) {
+                        *sum -= layer * flux;
+                    }
+                }
+            }
+            for (drive, value) in row.into_iter().enumerate() {
+                for signs in &self.images {
+                    let of = |drive| moved(&self.positions_m, drive, *signs, self.planes_m);
+                    self.added_inductance_h[(of(*coil), of(drive))] = value;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+        let reach = self.winding.outer_radius_m;
+        let top_m = self.top_m.max(0.0);
+        let parts = Components::Gradient;
+        let mut worst = 0.0_f64;
+        for height in [0.0, 1.0, 3.0] {
+            let z_m = lowest_m.max(top_m + 0.1 * reach) + height * reach;
+            let near = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+            let points: Vec<Point> = (self.positions_m.iter())
+                .flat_map(|[x, y]| near.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
+                .collect();
+            let values = |array: &Self| {
+                let sources = array.sources(z_m, z_m - top_m, 0.02 * tolerance);
+                let mut out = vec![0.0; self.positions_m.len() * parts.count() * points.len()];
+                sources.sample(&points, parts, &mut out);
+                out
+            };
+            let (fine, coarse) = (values(self), values(other));
+            let air = self.winding.field(0.0, z_m)?.gradient_norm();
+            let size = fine.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
+            let pairs = fine.iter().zip(&coarse);
+            let most = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            worst = worst.max(most / size);
+        }
+        let added = &self.added_inductance_h;
+        let least = 0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m;
+        let size = added.amax().max(least);
+        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+    }
+
+    /// Number of unknowns of one mirrored part.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.surface.size()
+    }
+
+    /// Dipoles for places no lower than `lowest_m` and no closer to the steel than `distance_m`.
+    #[must_use]
+    pub fn sources(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> ArraySources {
+        let drives = self.positions_m.len();
+        let distance = |z_m: f64| distance_m.max(lowest_m - z_m);
+        let mut all = (Vec::new(), Vec::new());
+        for (image, layers) in self.layers.iter().enumerate() {
+            let (places, moments) = self.surface.dipoles(drives, layers, &distance, tolerance);
+            let [sx, sy] = self.images[image];
+            let [cx, cy] = self.planes_m;
+            all.0
+                .extend(places.into_iter().map(|[x, y, z, nx, ny, nz]| {
+                    [
+                        cx + sx * (x - cx),
+                        cy + sy * (y - cy),
+                        z,
+                        sx * nx,
+                        sy * ny,
+                        nz,
+                    ]
+                }));
+            all.1.extend(moments);
+        }
+        ArraySources::of_dipoles(drives, self.top_m, all.0, all.1)
+    }
+
+    /// B at a place off the steel's surface, inside or out, with `currents_a` in the windings, T.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn field_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
+        let mut sum = [0.0; 3];
+        for (image, layers) in self.layers.iter().enumerate() {
+            let values: Vec<f64> = (layers.chunks_exact(currents_a.len()))
+                .map(|row| row.iter().zip(currents_a).map(|(v, i)| v * i).sum())
+                .collect();
+            let [sx, sy] = self.images[image];
+            let [cx, cy] = self.planes_m;
+            let [x, y, z] = place_m;
+            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
+            let [bx, by, bz] = self.surface.field_t(own, &values);
+            sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
+        }
+        for ([x, y], current) in self.positions_m.iter().zip(currents_a) {
+            let (dx, dy) = (place_m[0] - x, place_m[1] - y);
+            let field = self.winding.field(dx.hypot(dy), place_m[2])?;
+            let own = to_cartesian(&field, dx, dy).field_t_per_a;
+            for (sum, own) in sum.iter_mut().zip(own) {
+                *sum += current * own;
+            }
+        }
+        Ok(sum)
+    }
+}
+
+impl ArraySteel for IronArray {
+    fn is_present(&self) -> bool {
+        true
+    }
+
+    fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
+        self.added_inductance_h[(i, j)]
+    }
+
+    fn axial_source(&self, _: Winding, _: f64) -> Option<Box<dyn AxialSource>> {
+        None
+    }
+
+    fn direct(&self, _: &Winding) -> Option<(DirectField<'_>, &'static str)> {
+        None
+    }
+
+    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
+        Some(SteelField::Coupled(
+            self.sources(lowest_m, distance_m, tolerance),
+        ))
+    }
+
+    fn method(&self) -> Option<&'static str> {
+        Some(TWO_OF_IRON)
+    }
+
+    fn coupled(&self) -> Option<&CoupledArray> {
+        None
+    }
+}
+
+/// A drive as the mirror image of the first of its like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Drive {
+    first: usize,
+    image: usize,
+}
+
+fn drives(positions_m: &[[f64; 2]], images: &[[f64; 2]], planes_m: [f64; 2]) -> Vec<Drive> {
+    let mut out: Vec<Drive> = Vec::new();
+    for number in 0..positions_m.len() {
+        let found = images.iter().enumerate().find_map(|(image, signs)| {
+            let first = moved(positions_m, number, *signs, planes_m);
+            (first < number).then_some(Drive { first, image })
+        });
+        out.push(found.unwrap_or(Drive {
+            first: number,
+            image: 0,
+        }));
+    }
+    // The first of the first.
+    for number in 0..out.len() {
+        let before = out[out[number].first];
+        out[number] = Drive {
+            first: before.first,
+            image: out[number].image ^ before.image,
+        };
+    }
+    out
+}
+
+/// Places closer than that are one, m.
+pub(super) const SAME_M: f64 = 1e-9;
+
+fn apart_m(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The drive that a mirrored copy makes of `drive`.
+fn moved(positions_m: &[[f64; 2]], drive: usize, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> usize {
+    let [x, y] = positions_m[drive];
+    let at = [cx + sx * (x - cx), cy + sy * (y - cy)];
+    let place = positions_m
+        .iter()
+        .position(|other| apart_m(*other, at) < SAME_M);
+    place.expect("only what the windings share is a mirror")
+}
+
+/// Whether a place is within `least_m` of any of `nodes`.
+fn close(place_m: Point, nodes: &[Node], least_m: f64) -> bool {
+    nodes
+        .iter()
+        .any(|node| norm(minus(place_m, node.place_m)) < least_m)
+}
+
+impl IronArray {
+    /// Largest |B| with `currents_a` at least `depth_m` inside the steel's surface, T, and where, m.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn peak_t(&self, currents_a: &[f64], depth_m: f64) -> Result<(f64, Point), OnEdge> {
+        let nodes: Vec<Node> = (self.images.iter())
+            .flat_map(|image| {
+                let nodes = self.surface.nodes.iter();
+                nodes.map(|node| mirrored(node, *image, self.planes_m))
+            })
+            .collect();
+        let mut places: Vec<Point> = nodes
+            .par_iter()
+            .filter_map(|node| {
+                let area = norm(node.area_m2);
+                let place =
+                    std::array::from_fn(|i| node.place_m[i] - depth_m * node.area_m2[i] / area);
+                (!close(place, &nodes, 0.98 * depth_m)).then_some(place)
+            })
+            .collect();
+        let mut sparse: Vec<Point> = Vec::new();
+        for place in places.drain(..) {
+            if !sparse
+                .iter()
+                .any(|other| norm(minus(place, *other)) < 0.5 * depth_m)
+            {
+                sparse.push(place);
+            }
+        }
+        let peaks = sparse
+            .par_iter()
+            .map(|place| Ok((norm(self.field_t(*place, currents_a)?), *place)))
+            .collect::<Result<Vec<_>, OnEdge>>()?;
+        Ok(peaks.into_iter().fold(
+            (0.0, [0.0; 3]),
+            |most, one| if one.0 > most.0 { one } else { most },
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bodies::{Coils, cuboid, mesh, tube};
+    use super::super::face::Face;
+    use super::*;
+    use std::f64::consts::PI;
+
+    /// The moment of bodies in a uniform field H along z, over H: -int v n dS.
+    fn moment_m3(bodies: &[Vec<Face>], chi: f64, tier: usize) -> f64 {
+        let nothing = Coils {
+            winding: Winding {
+                inner_radius_m: 0.3,
+                outer_radius_m: 0.7,
+                length_m: 1.1,
+                turns: 1.0,
+            },
+            positions_m: &[],
+            core: None,
+        };
+        let mut iron = Iron::new(nothing, None).expect("nothing is at fault");
+        for body in bodies {
+            iron = iron.with(body.clone(), chi);
+        }
+        let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
+        let system = System::new(&iron, &surface, &[[1.0, 1.0]]);
+        let heights = surface.nodes.iter().map(|node| -node.place_m[2]);
+        let potential = DMatrix::from_iterator(surface.size(), 1, heights);
+        let solved = system.solve(&[potential], 1e-9);
+        let nodes = surface.nodes.iter().zip(solved.layers[0].iter());
+        nodes.map(|(node, layer)| -layer * node.area_m2[2]).sum()
+    }
+
+    #[test]
+    fn a_sphere_has_its_moment_at_any_permeability() {
+        for chi in [1e-9, 0.7, 999.0, 1e9] {
+            let sphere = Face::ball([0.3, -0.1, 0.2], [0.7; 3]);
+            let moment = moment_m3(&[sphere], chi, 2);
+            let expected = 4.0 * PI * 0.343 * chi / (chi + 3.0);
+            assert!(
+                (moment / expected - 1.0).abs() < 1e-4,
+                "{chi}: {moment} {expected}"
+            );
+        }
+    }
+
+    /// V chi / (1 + N chi), N of a spheroid with c = 2 a: 0.1736.
+    #[test]
+    fn an_ellipsoid_has_its_demagnetising_factor() {
+        let eccentricity = 0.75_f64.sqrt();
+        let n = (1.0 - eccentricity.powi(2)) / eccentricity.powi(2)
+            * (eccentricity.atanh() / eccentricity - 1.0);
+        let chi = 300.0;
+        let moment = moment_m3(&[Face::ball([0.0; 3], [0.7, 0.7, 1.4])], chi, 2);
+        let expected = 4.0 / 3.0 * PI * 0.7 * 0.7 * 1.4 * chi / (1.0 + n * chi);
+        assert!(
+            (moment / expected - 1.0).abs() < 5e-4,
+            "{moment} {expected}"
+        );
+    }
+
+    /// Jackson 5.121: the moment of a shell, and the field inside it.
+    #[test]
+    fn a_spherical_shell_has_its_moment() {
+        let (inner, outer, mu) = (0.9_f64, 1.0_f64, 200.0_f64);
+        let mut shell = Face::ball([0.0; 3], [outer; 3]);
+        shell.extend(
+            Face::ball([0.0; 3], [inner; 3])
+                .into_iter()
+                .map(Face::turned),
+        );
+        let ratio = (inner / outer).powi(3);
+        let below = (2.0 * mu + 1.0) * (mu + 2.0) - 2.0 * ratio * (mu - 1.0).powi(2);
+        let alpha = (2.0 * mu + 1.0) * (mu - 1.0) / below * (outer.powi(3) - inner.powi(3));
+        let moment = moment_m3(&[shell], mu - 1.0, 2);
+        assert!((moment / (4.0 * PI * alpha) - 1.0).abs() < 1e-3, "{moment}");
+    }
+
+    /// A cube's polarisability by its mesh and by its faces.
+    #[test]
+    fn a_mesh_is_the_body_that_it_bounds() {
+        let chi = 50.0;
+        let faces = moment_m3(&[cuboid([1.0, 1.3, 0.8])], chi, 2);
+        let corner = |k: usize| -> Point {
+            [
+                0.5 * if k & 1 > 0 { 1.0 } else { -1.0 },
+                0.65 * if k & 2 > 0 { 1.0 } else { -1.0 },
+                0.4 * if k & 4 > 0 { 1.0 } else { -1.0 },
+            ]
+        };
+        let squares = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles: Vec<[Point; 3]> = squares
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+            .map(|t| t.map(corner))
+            .collect();
+        // The diagonals alone are not sharp.
+        let sharp = |number: usize, side: usize| {
+            if number.is_multiple_of(2) {
+                side != 2
+            } else {
+                side != 0
+            }
+        };
+        let meshed = moment_m3(&[mesh(&triangles, 1.0, sharp)], chi, 1);
+        assert!((meshed / faces - 1.0).abs() < 2e-3, "{meshed} {faces}");
+    }
+
+    /// Two tubes end to end, apart by less and less, come to one.
+    #[test]
+    fn bodies_close_to_each_other_act_as_one() {
+        let half = |z: f64| {
+            let part = tube(0.3, 0.5, 1.0).into_iter();
+            part.map(|face| face.moved(|p| p, [0.0, 0.0, z]))
+                .collect::<Vec<Face>>()
+        };
+        let one = moment_m3(&[tube(0.3, 0.5, 2.0)], 20.0, 1);
+        let apart = |gap: f64| moment_m3(&[half(0.5 + 0.5 * gap), half(-0.5 - 0.5 * gap)], 20.0, 1);
+        let (near, far) = (apart(1e-3) / one, apart(1e-1) / one);
+        assert!(far < near && near < 1.0 && near > 0.97, "{near} {far}");
+    }
+}

@@ -1,0 +1,601 @@
+//! Bodies of steel as faces: cores, a plate that joins them, boxes, cylinders, tubes, meshes.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::array::SAME_M;
+use super::face::{Curve, Face, Point, Resolution};
+use crate::steel::CoreShape;
+use crate::winding::Winding;
+use fluxform_numerics::vec3::{dot, minus, plus};
+
+/// A point far out along a direction from another, m.
+fn beyond(at: Point, along: Point) -> Point {
+    plus(at, along.map(|a| 1e3 * a))
+}
+
+/// A ring wider than this many of its inner radii is cut more finely there.
+const WIDE: f64 = 3.0;
+
+const UP: Point = [0.0, 0.0, 1.0];
+const DOWN: Point = [0.0, 0.0, -1.0];
+
+/// The outline of a plate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outline {
+    /// Sides along x and y, m.
+    Rectangle([f64; 2]),
+    /// Diameter, m.
+    Round(f64),
+}
+
+/// A level plate of steel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plate {
+    /// Its outline about its middle.
+    pub outline: Outline,
+    /// Its middle, m.
+    pub centre_m: [f64; 2],
+    /// Height of its upper face, m.
+    pub top_m: f64,
+    /// Thickness, m.
+    pub thickness_m: f64,
+    /// Relative permeability less one.
+    pub chi: f64,
+}
+
+impl Plate {
+    fn contains(&self, [x, y]: [f64; 2], margin_m: f64) -> bool {
+        let (x, y) = (x - self.centre_m[0], y - self.centre_m[1]);
+        match self.outline {
+            Outline::Rectangle([a, b]) => {
+                x.abs() + margin_m < 0.5 * a && y.abs() + margin_m < 0.5 * b
+            }
+            Outline::Round(diameter) => x.hypot(y) + margin_m < 0.5 * diameter,
+        }
+    }
+}
+
+/// Equal windings, and what is in their bores.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coils<'a> {
+    /// Each, its axis at the origin.
+    pub winding: Winding,
+    /// Axes, m.
+    pub positions_m: &'a [[f64; 2]],
+    /// Their cores, their axes at the origin, with relative permeability less one.
+    pub core: Option<(CoreShape, f64)>,
+}
+
+impl Coils<'_> {
+    /// Radius about every axis that is cut out of what is near it, m.
+    fn radius_m(&self) -> f64 {
+        self.core
+            .map_or(self.winding.outer_radius_m, |(shape, _)| shape.radius_m)
+    }
+}
+
+/// Why bodies cannot be solved.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// A core is not wholly on the plate.
+    #[error("the core of coil {0} is not wholly above the plate")]
+    BesidePlate(usize),
+}
+
+/// Bodies, and what is known of their symmetry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Iron {
+    faces: Vec<Face>,
+    /// The middle of every connected body in plan, m.
+    centres_m: Vec<[f64; 2]>,
+    /// Planes x = and y = of mirrors, m.
+    pub planes_m: [f64; 2],
+    mirrors: [bool; 2],
+    largest_m: f64,
+    top_m: f64,
+}
+
+impl Iron {
+    /// The coils' cores, a plate below them or both.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn new(coils: Coils<'_>, plate: Option<&Plate>) -> Result<Self, Fault> {
+        let about = plate.map_or_else(|| middle(coils.positions_m), |plate| plate.centre_m);
+        let mut iron = Self {
+            faces: Vec::new(),
+            centres_m: Vec::new(),
+            planes_m: about,
+            mirrors: [0, 1].map(|axis| is_mirrored(coils.positions_m, axis, about[axis])),
+            largest_m: 0.0,
+            top_m: f64::NEG_INFINITY,
+        };
+        let touching = match (coils.core, plate) {
+            (Some((shape, _)), Some(plate)) => (shape.bottom_m - plate.top_m).abs() < SAME_M,
+            _ => false,
+        };
+        if let Some(plate) = plate {
+            iron.add_plate(plate, coils, touching)?;
+        }
+        if let Some((shape, chi)) = coils.core {
+            let foot = plate.filter(|_| touching).map(|plate| plate.chi);
+            iron.add_cores(coils, shape, chi, foot);
+        }
+        Ok(iron)
+    }
+
+    /// Adds a body of its own.
+    #[must_use]
+    pub fn with(mut self, body: Vec<Face>, chi: f64) -> Self {
+        let number = self.centres_m.len();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for face in &body {
+            for (u, v) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)] {
+                let at = face.point(u, v).0;
+                for i in 0..3 {
+                    low[i] = low[i].min(at[i]);
+                    high[i] = high[i].max(at[i]);
+                }
+            }
+        }
+        for i in 0..3 {
+            self.largest_m = self.largest_m.max(high[i] - low[i]);
+        }
+        self.top_m = self.top_m.max(high[2]);
+        self.centres_m
+            .push([0, 1].map(|i| 0.5 * (low[i] + high[i])));
+        // Whether it is its own image is not looked at.
+        self.mirrors = [false; 2];
+        self.faces.extend(body.into_iter().map(|mut face| {
+            face.chi = [chi, 0.0];
+            face.body = number;
+            face
+        }));
+        self
+    }
+
+    fn add_plate(&mut self, plate: &Plate, coils: Coils<'_>, touching: bool) -> Result<(), Fault> {
+        let body = self.centres_m.len();
+        self.centres_m.push(plate.centre_m);
+        let bottom_m = plate.top_m - plate.thickness_m;
+        let extent = match plate.outline {
+            Outline::Rectangle([a, b]) => a.max(b),
+            Outline::Round(diameter) => diameter,
+        };
+        self.largest_m = self.largest_m.max(extent);
+        self.top_m = self.top_m.max(plate.top_m);
+        let radius_m = coils.radius_m();
+        let mut faces = plate_sides(plate);
+        for (number, site) in coils.positions_m.iter().enumerate() {
+            if !plate.contains(*site, radius_m + SAME_M) {
+                return Err(Fault::BesidePlate(number));
+            }
+            let cell = Cell::new(plate, coils.positions_m, number);
+            faces.extend(cell.ring(*site, radius_m, plate.top_m, UP, touching));
+            faces.extend(cell.ring(*site, radius_m, bottom_m, DOWN, false));
+            faces.extend(disc(*site, radius_m, bottom_m, DOWN, false));
+            if !touching {
+                faces.extend(disc(*site, radius_m, plate.top_m, UP, false));
+            }
+        }
+        self.faces.extend(faces.into_iter().map(|mut face| {
+            face.chi = [plate.chi, 0.0];
+            face.body = body;
+            face
+        }));
+        Ok(())
+    }
+
+    /// `foot`: of what they stand on, if they do.
+    fn add_cores(&mut self, coils: Coils<'_>, shape: CoreShape, chi: f64, foot: Option<f64>) {
+        self.largest_m = self
+            .largest_m
+            .max(shape.length_m())
+            .max(2.0 * shape.radius_m);
+        self.top_m = self.top_m.max(shape.top_m);
+        for (number, site) in coils.positions_m.iter().enumerate() {
+            let body = match foot {
+                Some(_) => 0,
+                None => {
+                    self.centres_m.push(*site);
+                    self.centres_m.len() - 1
+                }
+            };
+            let mut add = |faces: Vec<Face>, below: f64| {
+                self.faces.extend(faces.into_iter().map(|mut face| {
+                    face.chi = [chi, below];
+                    face.body = body;
+                    face.bore = Some(number);
+                    face
+                }));
+            };
+            let mut side = cylinder_side(*site, shape.radius_m, [shape.bottom_m, shape.top_m]);
+            for height_m in [-coils.winding.length_m, 0.0] {
+                let v = (height_m - shape.bottom_m) / shape.length_m();
+                side = side.into_iter().map(|face| face.cut(v)).collect();
+            }
+            add(side, 0.0);
+            add(disc(*site, shape.radius_m, shape.top_m, UP, true), 0.0);
+            // Steel of one kind is joined without a surface.
+            if foot != Some(chi) {
+                let end = disc(*site, shape.radius_m, shape.bottom_m, DOWN, true);
+                add(end, foot.unwrap_or(0.0));
+            }
+        }
+    }
+
+    /// The faces on one side of the mirrors.
+    pub(super) fn part(&self) -> Vec<Face> {
+        let kept = |face: &&Face| {
+            let at = face.point(0.5, 0.5).0;
+            (0..2).all(|axis| !self.mirrors[axis] || at[axis] > self.planes_m[axis])
+        };
+        self.faces.iter().filter(kept).cloned().collect()
+    }
+
+    /// Signs of x and y of the copies that the mirrors make; the mirror of bit k applied to one copy gives another.
+    pub(super) fn images(&self) -> Vec<[f64; 2]> {
+        let mut out = vec![[1.0, 1.0]];
+        for axis in 0..2 {
+            if self.mirrors[axis] {
+                let copies: Vec<[f64; 2]> = out.clone();
+                out.extend(copies.into_iter().map(|mut signs| {
+                    signs[axis] = -1.0;
+                    signs
+                }));
+            }
+        }
+        out
+    }
+
+    /// Whether an image leaves a body where it is.
+    pub(super) fn keeps(&self, body: usize, signs: [f64; 2]) -> bool {
+        (0..2).all(|axis| {
+            signs[axis] > 0.0 || (self.centres_m[body][axis] - self.planes_m[axis]).abs() < SAME_M
+        })
+    }
+
+    /// The largest relative permeability less one of every body.
+    pub(super) fn scales(&self) -> Vec<f64> {
+        let mut out = vec![0.0_f64; self.centres_m.len()];
+        for face in &self.faces {
+            out[face.body] = out[face.body].max(face.chi[0]).max(face.chi[1]);
+        }
+        out
+    }
+
+    /// Height of the highest steel, m.
+    #[must_use]
+    pub fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    pub(super) fn resolution(
+        &self,
+        (order, per_turn, levels, along): (usize, usize, i32, f64),
+    ) -> Resolution {
+        Resolution {
+            order,
+            per_turn,
+            levels,
+            panel_m: self.largest_m / along,
+        }
+    }
+}
+
+fn middle(positions_m: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|axis| {
+        let of = positions_m.iter().map(|p| p[axis]);
+        let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+            (a.min(x), b.max(x))
+        });
+        if low <= high { 0.5 * (low + high) } else { 0.0 }
+    })
+}
+
+fn is_mirrored(positions_m: &[[f64; 2]], axis: usize, plane_m: f64) -> bool {
+    positions_m.iter().all(|place| {
+        let mut image = *place;
+        image[axis] = 2.0 * plane_m - image[axis];
+        positions_m
+            .iter()
+            .any(|other| (other[0] - image[0]).hypot(other[1] - image[1]) < SAME_M)
+    })
+}
+
+fn quarters() -> [[f64; 2]; 4] {
+    [0.0, 1.0, 2.0, 3.0].map(|k| [k * FRAC_PI_2, (k + 1.0) * FRAC_PI_2])
+}
+
+/// A level disc in four parts.
+fn disc([x, y]: [f64; 2], radius_m: f64, z_m: f64, normal: Point, sharp: bool) -> Vec<Face> {
+    let centre = [x, y, z_m];
+    let part = |[from, to]: [f64; 2]| {
+        Face::ruled(
+            Curve::segment(centre, centre),
+            Curve::arc(centre, radius_m, from, to),
+            [false, false, false, sharp],
+            beyond(centre, normal),
+        )
+    };
+    quarters().map(part).to_vec()
+}
+
+/// The side of an upright cylinder in four parts.
+fn cylinder_side([x, y]: [f64; 2], radius_m: f64, [low, high]: [f64; 2]) -> Vec<Face> {
+    let part = |[from, to]: [f64; 2]| {
+        let (s, c) = (0.5 * (from + to)).sin_cos();
+        Face::ruled(
+            Curve::arc([x, y, low], radius_m, from, to),
+            Curve::arc([x, y, high], radius_m, from, to),
+            [false, false, true, true],
+            beyond([x, y, 0.5 * (low + high)], [c, s, 0.0]),
+        )
+    };
+    quarters().map(part).to_vec()
+}
+
+fn plate_sides(plate: &Plate) -> Vec<Face> {
+    let heights = [plate.top_m - plate.thickness_m, plate.top_m];
+    let [cx, cy] = plate.centre_m;
+    match plate.outline {
+        Outline::Round(diameter) => cylinder_side(plate.centre_m, 0.5 * diameter, heights),
+        Outline::Rectangle([a, b]) => {
+            let (a, b) = (0.5 * a, 0.5 * b);
+            let rim = [
+                ([a, 0.0], [a, b]),
+                ([a, b], [0.0, b]),
+                ([0.0, b], [-a, b]),
+                ([-a, b], [-a, 0.0]),
+                ([-a, 0.0], [-a, -b]),
+                ([-a, -b], [0.0, -b]),
+                ([0.0, -b], [a, -b]),
+                ([a, -b], [a, 0.0]),
+            ];
+            rim.map(|(from, to)| {
+                let at = |[x, y]: [f64; 2], z: f64| [cx + x, cy + y, z];
+                let corner = |[x, y]: [f64; 2]| x != 0.0 && y != 0.0;
+                let middle = [0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1])];
+                Face::ruled(
+                    Curve::segment(at(from, heights[0]), at(to, heights[0])),
+                    Curve::segment(at(from, heights[1]), at(to, heights[1])),
+                    [corner(from), corner(to), true, true],
+                    beyond([cx, cy, heights[0]], [middle[0], middle[1], 0.0]),
+                )
+            })
+            .to_vec()
+        }
+    }
+}
+
+/// What lies nearer to one core than to the others, on the plate: about the core's axis, lines n.x = c and
+/// the plate's rim.
+struct Cell {
+    /// n, c, and whether it is the plate's edge.
+    lines: Vec<([f64; 2], f64, bool)>,
+    /// The middle of a round plate, and its radius.
+    rim: Option<([f64; 2], f64)>,
+}
+
+impl Cell {
+    fn new(plate: &Plate, sites: &[[f64; 2]], own: usize) -> Self {
+        let [x, y] = sites[own];
+        let to_centre = [plate.centre_m[0] - x, plate.centre_m[1] - y];
+        let mut lines = Vec::new();
+        let mut rim = None;
+        match plate.outline {
+            Outline::Rectangle([a, b]) => {
+                for (normal, half) in [
+                    ([1.0, 0.0], 0.5 * a),
+                    ([-1.0, 0.0], 0.5 * a),
+                    ([0.0, 1.0], 0.5 * b),
+                    ([0.0, -1.0], 0.5 * b),
+                ] {
+                    let c = half + normal[0] * to_centre[0] + normal[1] * to_centre[1];
+                    lines.push((normal, c, true));
+                }
+            }
+            Outline::Round(diameter) => rim = Some((to_centre, 0.5 * diameter)),
+        }
+        for (number, other) in sites.iter().enumerate() {
+            let d = [other[0] - x, other[1] - y];
+            let long = d[0].hypot(d[1]);
+            if number != own {
+                lines.push(([d[0] / long, d[1] / long], 0.5 * long, false));
+            }
+        }
+        Self { lines, rim }
+    }
+
+    /// Distance of the border at an angle, m, and which line it is (as many as there are: the rim).
+    fn border(&self, angle: f64) -> (f64, usize) {
+        let (s, c) = angle.sin_cos();
+        let mut nearest = (f64::INFINITY, 0);
+        for (number, (normal, offset, _)) in self.lines.iter().enumerate() {
+            let along = normal[0] * c + normal[1] * s;
+            if along > 0.0 && offset / along < nearest.0 {
+                nearest = (offset / along, number);
+            }
+        }
+        if let Some((centre, radius)) = self.rim {
+            let along = centre[0] * c + centre[1] * s;
+            let square = radius * radius - centre[0].powi(2) - centre[1].powi(2);
+            let distance = along + (along * along + square).sqrt();
+            if distance < nearest.0 {
+                nearest = (distance, self.lines.len());
+            }
+        }
+        nearest
+    }
+
+    /// Angles between which the border is one line: the quarters, and where another takes over.
+    fn angles(&self) -> Vec<f64> {
+        let mut out: Vec<f64> = (0..=4).map(|k| f64::from(k) * FRAC_PI_2).collect();
+        let steps = 720;
+        let step = TAU / f64::from(steps);
+        for k in 0..steps {
+            // Off the quarters, so that a corner lies within.
+            let (mut low, mut high) = ((f64::from(k) + 0.37) * step, (f64::from(k) + 1.37) * step);
+            let (first, last) = (self.border(low).1, self.border(high).1);
+            if first == last {
+                continue;
+            }
+            while high - low > 1e-14 * TAU {
+                let middle = 0.5 * (low + high);
+                if middle == low || middle == high {
+                    break;
+                }
+                if self.border(middle).1 == first {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            out.push(high % TAU);
+        }
+        out.sort_by(f64::total_cmp);
+        out.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+        out
+    }
+
+    /// The cell less a disc of `radius_m` about its core's axis, at a height.
+    fn ring(
+        &self,
+        [x, y]: [f64; 2],
+        radius_m: f64,
+        z_m: f64,
+        normal: Point,
+        joined: bool,
+    ) -> Vec<Face> {
+        let angles = self.angles();
+        // Far out the layer changes over the distance from the axis.
+        let widest = angles
+            .iter()
+            .fold(0.0_f64, |w, angle| w.max(self.border(*angle).0));
+        let graded = joined || widest > WIDE * radius_m;
+        let part = |pair: &[f64]| {
+            let [from, to] = [pair[0], pair[1]];
+            let line = self.border(0.5 * (from + to)).1;
+            let on_line = |angle: f64| {
+                let (s, c) = angle.sin_cos();
+                let (distance, _) = if line < self.lines.len() {
+                    let (n, offset, _) = self.lines[line];
+                    (offset / (n[0] * c + n[1] * s), line)
+                } else {
+                    self.border(angle)
+                };
+                [x + distance * c, y + distance * s, z_m]
+            };
+            let (a, b) = (on_line(from), on_line(to));
+            let edge = line >= self.lines.len() || self.lines[line].2;
+            let border = match self.rim {
+                Some((centre, radius)) if line == self.lines.len() => {
+                    let middle = [x + centre[0], y + centre[1], z_m];
+                    let angle = |p: Point| (p[1] - middle[1]).atan2(p[0] - middle[0]);
+                    let first = angle(a);
+                    let mut turn = angle(b) - first;
+                    if turn < 0.0 {
+                        turn += TAU;
+                    }
+                    debug_assert!(turn < PI);
+                    Curve::arc(middle, radius, first, first + turn)
+                }
+                _ => Curve::segment(a, b),
+            };
+            let centre = [x, y, z_m];
+            Face::ruled(
+                Curve::arc(centre, radius_m, from, to),
+                border,
+                [false, false, graded, edge],
+                beyond(centre, normal),
+            )
+        };
+        angles.windows(2).map(part).collect()
+    }
+}
+
+/// A box about the origin, sides along the axes, m.
+#[must_use]
+pub fn cuboid(sides_m: Point) -> Vec<Face> {
+    let mut faces = Vec::new();
+    for axis in 0..3 {
+        for sign in [-1.0, 1.0] {
+            let at = |u: f64, v: f64| {
+                let mut point = [0.0; 3];
+                point[axis] = 0.5 * sign * sides_m[axis];
+                point[(axis + 1) % 3] = 0.5 * u * sides_m[(axis + 1) % 3];
+                point[(axis + 2) % 3] = 0.5 * v * sides_m[(axis + 2) % 3];
+                point
+            };
+            faces.push(Face::ruled(
+                Curve::segment(at(-1.0, -1.0), at(1.0, -1.0)),
+                Curve::segment(at(-1.0, 1.0), at(1.0, 1.0)),
+                [true; 4],
+                at(0.0, 0.0).map(|x| 3.0 * x),
+            ));
+        }
+    }
+    faces
+}
+
+/// A cylinder about the origin along z, or a tube where `inner_m` is above nothing; radii and length, m.
+#[must_use]
+pub fn tube(inner_m: f64, outer_m: f64, length_m: f64) -> Vec<Face> {
+    let (low, high) = (-0.5 * length_m, 0.5 * length_m);
+    let mut faces = cylinder_side([0.0; 2], outer_m, [low, high]);
+    if inner_m > 0.0 {
+        let inside = cylinder_side([0.0; 2], inner_m, [low, high]);
+        faces.extend(inside.into_iter().map(Face::turned));
+    }
+    for (z, normal) in [(low, DOWN), (high, UP)] {
+        if inner_m > 0.0 {
+            let centre = [0.0, 0.0, z];
+            faces.extend(quarters().map(|[from, to]| {
+                Face::ruled(
+                    Curve::arc(centre, inner_m, from, to),
+                    Curve::arc(centre, outer_m, from, to),
+                    [false, false, true, true],
+                    beyond(centre, normal),
+                )
+            }));
+        } else {
+            faces.extend(disc([0.0; 2], outer_m, z, normal, true));
+        }
+    }
+    faces
+}
+
+/// A closed mesh's triangles, corners in m, each as three quadrangles; edges at which it bends are graded to.
+#[must_use]
+pub fn mesh(
+    triangles: &[[Point; 3]],
+    outward: f64,
+    is_sharp: impl Fn(usize, usize) -> bool,
+) -> Vec<Face> {
+    let mut faces = Vec::new();
+    for (number, corners) in triangles.iter().enumerate() {
+        let half = |a: Point, b: Point| std::array::from_fn(|i| 0.5 * (a[i] + b[i]));
+        let [a, b, c] = *corners;
+        let centre = std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0);
+        let normal = fluxform_numerics::vec3::cross(minus(b, a), minus(c, a)).map(|n| outward * n);
+        for k in 0..3 {
+            let (at, next, before) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
+            let mut face = Face::ruled(
+                Curve::segment(at, half(at, next)),
+                Curve::segment(half(at, before), centre),
+                [
+                    is_sharp(number, (k + 2) % 3),
+                    false,
+                    is_sharp(number, k),
+                    false,
+                ],
+                centre,
+            );
+            if dot(face.point(0.5, 0.5).1, normal) < 0.0 {
+                face = face.turned();
+            }
+            faces.push(face);
+        }
+    }
+    faces
+}

@@ -1,0 +1,94 @@
+//! The scalar potential of a winding where its field has no curl, cut along the bore.
+//!
+//! A winding is a stack of magnetised discs: M = N / L up to the inner radius, falling to nothing at
+//! the outer. Their charges on the two faces give phi, and in the bore the turns passed below:
+//!
+//! ```text
+//! phi(r, z) = f(r, z) - f(r, z + L),  f(r, u) = int s(a) a / (2 agm(|(a + r, u)|, |(a - r, u)|)) da.
+//! ```
+
+use crate::winding::Winding;
+use fluxform_numerics::gauss;
+
+impl Winding {
+    /// phi with H = -grad phi outside the winding, A per ampere, at radius `r_m` and height `z_m`, to
+    /// `tolerance` of a face's; it jumps by the turns where the bore is crossed. `in_bore`: the branch
+    /// that goes up through the bore from below, else the one that goes round the winding.
+    #[must_use]
+    pub fn potential(&self, r_m: f64, z_m: f64, in_bore: bool, tolerance: f64) -> f64 {
+        let height = ((z_m + self.length_m) / self.length_m).clamp(0.0, 1.0);
+        let passed = if in_bore { self.turns * height } else { 0.0 };
+        self.charged_face(r_m, z_m, tolerance)
+            - self.charged_face(r_m, z_m + self.length_m, tolerance)
+            - passed
+    }
+
+    /// f above.
+    fn charged_face(&self, r_m: f64, u_m: f64, tolerance: f64) -> f64 {
+        let (inner, outer) = (self.inner_radius_m, self.outer_radius_m);
+        let full = self.turns / self.length_m;
+        let mut sum = 0.0;
+        let mut part = |from: f64, to: f64| {
+            if to <= from {
+                return;
+            }
+            gauss::graded(from - r_m, to - r_m, u_m, tolerance, |offset, weight| {
+                let a = r_m + offset;
+                let density = full * ((outer - a) / (outer - inner)).clamp(0.0, 1.0);
+                sum += weight * density * a / (2.0 * mean((a + r_m).hypot(u_m), offset.hypot(u_m)));
+            });
+        };
+        part(0.0, inner);
+        part(inner, outer);
+        sum
+    }
+}
+
+/// The arithmetic-geometric mean.
+fn mean(mut a: f64, mut b: f64) -> f64 {
+    while (a - b).abs() > 1e-9 * a {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    // One step more squares the difference.
+    0.5 * (a + b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fluxform_base::units::MU_0_T_M_PER_A;
+
+    /// Its slope is the field, on either branch.
+    #[test]
+    fn the_potential_has_the_field_as_its_slope() {
+        let winding = Winding {
+            inner_radius_m: 0.7,
+            outer_radius_m: 1.3,
+            length_m: 1.9,
+            turns: 3.7,
+        };
+        for (r, z, in_bore) in [
+            (0.4, -0.8, true),
+            (0.7, -0.3, true),
+            (0.9, 0.4, false),
+            (0.3, -2.4, false),
+            (0.2, 0.3, true),
+            (2.1, -1.1, false),
+        ] {
+            let h = 1e-4;
+            let slope = |dr: f64, dz: f64| {
+                let at = |k: f64| winding.potential(r + k * dr, z + k * dz, in_bore, 1e-12);
+                -(at(-2.0) - 8.0 * at(-1.0) + 8.0 * at(1.0) - at(2.0)) / (12.0 * h)
+            };
+            let field = winding.field(r, z).unwrap();
+            let scale = field.b_z.hypot(field.b_r) / MU_0_T_M_PER_A;
+            let along_z = slope(0.0, h) - field.b_z / MU_0_T_M_PER_A;
+            assert!(along_z.abs() < 1e-8 * scale, "{r} {z}: {along_z}");
+            // On the winding's inner side the slope along r bends.
+            if r != winding.inner_radius_m {
+                let along_r = slope(h, 0.0) - field.b_r / MU_0_T_M_PER_A;
+                assert!(along_r.abs() < 1e-8 * scale, "{r} {z}: {along_r}");
+            }
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! The double layer on panels: its operator at the nodes, and dipoles for places some way off.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+use super::face::{Face, Node, Panel, Point, Resolution};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
+use fluxform_numerics::vec3::{dot, minus, norm};
+
+/// Distances in half sides from which on a panel's own nodes integrate the kernel, and from which on those
+/// of a finer rule do.
+const FAR: f64 = 3.0;
+const NEAR: f64 = 1.1;
+/// Halvings about a place on a curved panel itself, after which what is left is nothing.
+const MOST_HALVINGS: usize = 14;
+/// Nodes of the finer rule beyond the panel's own.
+const MORE_NODES: usize = 3;
+/// Most nodes along a panel's side.
+const MOST_ORDER: usize = 16;
+/// Length of the panels of dipoles relative to their distance.
+const DIPOLE_PANEL: f64 = 1.5;
+/// Most nodes along a side of them.
+const MOST_DIPOLES: usize = 24;
+
+/// Faces cut into panels, with nodes.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Surface {
+    pub(super) faces: Vec<Face>,
+    panels: Vec<Panel>,
+    /// Nodes along a panel's side.
+    order: usize,
+    /// Panel by panel.
+    pub(super) nodes: Vec<Node>,
+    basis: Basis,
+}
+
+impl Surface {
+    /// `faces` cut as `resolution` asks for.
+    #[must_use]
+    pub fn new(faces: Vec<Face>, resolution: &Resolution) -> Self {
+        let order = resolution.order;
+        let panels: Vec<Panel> = (faces.iter().enumerate())
+            .flat_map(|(number, face)| face.panels(number, resolution))
+            .collect();
+        let nodes = panels
+            .iter()
+            .flat_map(|panel| panel.nodes(&faces[panel.face], [order; 2]))
+            .collect();
+        Self {
+            basis: Basis::new(gauss::rule(order)),
+            faces,
+            panels,
+            order,
+            nodes,
+        }
+    }
+
+    /// Number of unknowns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The face of a node.
+    #[must_use]
+    pub fn face_of(&self, node: usize) -> &Face {
+        &self.faces[self.panels[node / (self.order * self.order)].face]
+    }
+
+    /// Adds to `row` what the layer of every node gives at `target_m`:
+    /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
+    pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
+        let own = self.order * self.order;
+        let mut scratch = [Vec::new(), Vec::new()];
+        for (index, panel) in self.panels.iter().enumerate() {
+            let row = &mut row[index * own..(index + 1) * own];
+            let away = minus(target_m, panel.centre_m);
+            let distance = norm(away);
+            if let Some(normal) = panel.plane
+                && dot(normal, away).abs() < 1e-12 * (distance + panel.radius_m)
+            {
+                continue;
+            }
+            let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
+            if distance - panel.radius_m > FAR * half {
+                for (value, node) in row.iter_mut().zip(&self.nodes[index * own..]) {
+                    *value += kernel(target_m, node);
+                }
+            } else {
+                self.add_near(target_m, panel, row, &mut scratch);
+            }
+        }
+    }
+
+    /// Visits parts of a panel small enough for a rule of [`MORE_NODES`] more nodes to integrate the kernel
+    /// at `target_m`.
+    fn parts(
+        &self,
+        target_m: Point,
+        part: &Panel,
+        halvings: usize,
+        visit: &mut impl FnMut(&Panel),
+    ) {
+        let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
+        let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
+        // Of a plane panel nothing is left to singularities; halving ends by itself.
+        let most = if part.plane.is_none() {
+            MOST_HALVINGS
+        } else {
+            8 * MOST_HALVINGS
+        };
+        if distance < NEAR * half && halvings < most {
+            for half in part.halves(&self.faces[part.face]) {
+                self.parts(target_m, &half, halvings + 1, visit);
+            }
+        } else {
+            visit(part);
+        }
+    }
+
+    /// The panel's basis at the nodes of a rule with `order` nodes along each side of a part of it.
+    fn basis_on(&self, whole: &Panel, part: &Panel, order: usize, out: &mut [Vec<f64>; 2]) {
+        let count = self.order;
+        for (side, out) in out.iter_mut().enumerate() {
+            let (lo, hi) = (whole.range[2 * side], whole.range[2 * side + 1]);
+            let (from, to) = (part.range[2 * side], part.range[2 * side + 1]);
+            out.resize(order * count, 0.0);
+            for (x, weights) in gauss::rule(order)
+                .nodes
+                .iter()
+                .zip(out.chunks_exact_mut(count))
+            {
+                let at = from + 0.5 * (to - from) * (1.0 + x);
+                self.basis
+                    .weights(2.0 * (at - lo) / (hi - lo) - 1.0, weights);
+            }
+        }
+    }
+
+    fn add_near(
+        &self,
+        target_m: Point,
+        whole: &Panel,
+        row: &mut [f64],
+        scratch: &mut [Vec<f64>; 2],
+    ) {
+        let (order, count) = (self.order + MORE_NODES, self.order);
+        let face = &self.faces[whole.face];
+        self.parts(target_m, whole, 0, &mut |part| {
+            self.basis_on(whole, part, order, scratch);
+            let [first, second] = &*scratch;
+            let mut line = [0.0; MOST_ORDER];
+            let nodes = part.nodes(face, [order; 2]);
+            for (nodes, first) in nodes.chunks_exact(order).zip(first.chunks_exact(count)) {
+                line[..count].fill(0.0);
+                for (node, second) in nodes.iter().zip(second.chunks_exact(count)) {
+                    let value = kernel(target_m, node);
+                    for (sum, weight) in line.iter_mut().zip(second) {
+                        *sum += value * weight;
+                    }
+                }
+                for (weight, row) in first.iter().zip(row.chunks_exact_mut(count)) {
+                    for (value, sum) in row.iter_mut().zip(&line) {
+                        *value += weight * sum;
+                    }
+                }
+            }
+        });
+    }
+
+    /// B of the layer `values`, one per node, at a place off the surface, T.
+    #[must_use]
+    pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
+        let own = self.order * self.order;
+        let (order, count) = (self.order + MORE_NODES, self.order);
+        let mut scratch = [Vec::new(), Vec::new()];
+        let mut sum = [0.0; 3];
+        for (index, panel) in self.panels.iter().enumerate() {
+            let values = &values[index * own..(index + 1) * own];
+            let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
+            if distance > FAR * 0.5 * panel.sides_m[0].max(panel.sides_m[1]) {
+                for (value, node) in values.iter().zip(&self.nodes[index * own..]) {
+                    add_dipole(target_m, node, *value, &mut sum);
+                }
+                continue;
+            }
+            self.parts(target_m, panel, 0, &mut |part| {
+                self.basis_on(panel, part, order, &mut scratch);
+                let nodes = part.nodes(&self.faces[panel.face], [order; 2]);
+                for (k, node) in nodes.iter().enumerate() {
+                    let first = &scratch[0][k / order * count..][..count];
+                    let second = &scratch[1][k % order * count..][..count];
+                    let value: f64 = (first.iter().zip(values.chunks_exact(count)))
+                        .map(|(a, row)| a * row.iter().zip(second).map(|(v, b)| v * b).sum::<f64>())
+                        .sum();
+                    add_dipole(target_m, node, value, &mut sum);
+                }
+            });
+        }
+        sum
+    }
+
+    /// Dipoles that stand for the layers `values` ([node][drive]) at places that are `distance_m(z)` or more from
+    /// whatever lies at the height z: their places with unit normals, and their moments [dipole, drive].
+    #[must_use]
+    pub fn dipoles(
+        &self,
+        drives: usize,
+        values: &[f64],
+        distance_m: &(impl Fn(f64) -> f64 + Sync),
+        tolerance: f64,
+    ) -> (Vec<[f64; 6]>, Vec<f64>) {
+        let mut starts = vec![self.panels.len(); self.faces.len() + 1];
+        for (index, panel) in self.panels.iter().enumerate().rev() {
+            starts[panel.face] = index;
+        }
+        let parts: Vec<_> = (0..self.faces.len())
+            .into_par_iter()
+            .map(|number| {
+                let whole = Panel::new(&self.faces[number], number, [0.0, 1.0, 0.0, 1.0]);
+                let panels = starts[number]..starts[number + 1];
+                let mut out = (Vec::new(), Vec::new());
+                self.add_dipoles(
+                    &whole, panels, drives, values, distance_m, tolerance, &mut out,
+                );
+                out
+            })
+            .collect();
+        let mut all = (Vec::new(), Vec::new());
+        for (places, moments) in parts {
+            all.0.extend(places);
+            all.1.extend(moments);
+        }
+        all
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the recursion's state")]
+    fn add_dipoles(
+        &self,
+        part: &Panel,
+        panels: std::ops::Range<usize>,
+        drives: usize,
+        values: &[f64],
+        distance_m: &impl Fn(f64) -> f64,
+        tolerance: f64,
+        out: &mut (Vec<[f64; 6]>, Vec<f64>),
+    ) {
+        let face = &self.faces[part.face];
+        let distance = distance_m(part.centre_m[2] + part.radius_m);
+        if part.sides_m[0].max(part.sides_m[1]) > DIPOLE_PANEL * distance {
+            for half in part.halves(face) {
+                self.add_dipoles(
+                    &half,
+                    panels.clone(),
+                    drives,
+                    values,
+                    distance_m,
+                    tolerance,
+                    out,
+                );
+            }
+            return;
+        }
+        let orders = part.sides_m.map(|side| {
+            let ratio = 2.0 * distance / side.max(1e-9 * distance);
+            let digits = (1.0 / tolerance).ln() / (ratio + ratio.hypot(1.0)).ln();
+            (digits.ceil() as usize + 1).clamp(2, MOST_DIPOLES)
+        });
+        let coarse = part.nodes(face, orders);
+        let [first, second] = orders.map(|order| Basis::new(gauss::rule(order)));
+        let mut moments = vec![0.0; coarse.len() * drives];
+        let (mut wu, mut wv) = (vec![0.0; orders[0]], vec![0.0; orders[1]]);
+        let own = self.order * self.order;
+        let (mut ou, mut ov) = (vec![0.0; self.order], vec![0.0; self.order]);
+        let mut layer = vec![0.0; drives];
+        for index in panels {
+            let panel = &self.panels[index];
+            let [pu0, pu1, pv0, pv1] = panel.range;
+            let [u0, u1, v0, v1] = part.range;
+            let shared = [pu0.max(u0), pu1.min(u1), pv0.max(v0), pv1.min(v1)];
+            if shared[1] <= shared[0] || shared[3] <= shared[2] {
+                continue;
+            }
+            let fine = orders.map(|order| self.order + order.div_ceil(2));
+            let rules = fine.map(gauss::rule);
+            let common = Panel {
+                range: shared,
+                ..*panel
+            };
+            for (k, node) in common.nodes(face, fine).iter().enumerate() {
+                let x = [rules[0].nodes[k / fine[1]], rules[1].nodes[k % fine[1]]];
+                let at = |side: usize| {
+                    let (from, to) = (shared[2 * side], shared[2 * side + 1]);
+                    from + 0.5 * (to - from) * (1.0 + x[side])
+                };
+                let within = |range: [f64; 4], side: usize| {
+                    let (lo, hi) = (range[2 * side], range[2 * side + 1]);
+                    2.0 * (at(side) - lo) / (hi - lo) - 1.0
+                };
+                self.basis.weights(within(panel.range, 0), &mut ou);
+                self.basis.weights(within(panel.range, 1), &mut ov);
+                layer.fill(0.0);
+                for (a, wa) in ou.iter().enumerate() {
+                    for (b, wb) in ov.iter().enumerate() {
+                        let from = (index * own + a * self.order + b) * drives;
+                        for (sum, value) in layer.iter_mut().zip(&values[from..from + drives]) {
+                            *sum += wa * wb * value;
+                        }
+                    }
+                }
+                first.weights(within(part.range, 0), &mut wu);
+                second.weights(within(part.range, 1), &mut wv);
+                let area = norm(node.area_m2);
+                for (a, wa) in wu.iter().enumerate() {
+                    for (b, wb) in wv.iter().enumerate() {
+                        let to = (a * orders[1] + b) * drives;
+                        for (moment, value) in moments[to..to + drives].iter_mut().zip(&layer) {
+                            *moment += wa * wb * area * value;
+                        }
+                    }
+                }
+            }
+        }
+        for node in coarse {
+            let area = norm(node.area_m2);
+            let [nx, ny, nz] = node.area_m2.map(|n| n / area);
+            let [x, y, z] = node.place_m;
+            out.0.push([x, y, z, nx, ny, nz]);
+        }
+        out.1.extend(moments);
+    }
+}
+
+/// A node's image under mirrors of these signs at these planes.
+pub(super) fn mirrored(node: &Node, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> Node {
+    let [x, y, z] = node.place_m;
+    let [ax, ay, az] = node.area_m2;
+    Node {
+        place_m: [cx + sx * (x - cx), cy + sy * (y - cy), z],
+        area_m2: [sx * ax, sy * ay, az],
+    }
+}
+
+#[inline]
+fn kernel(target_m: Point, node: &Node) -> f64 {
+    let d = minus(target_m, node.place_m);
+    let square = dot(d, d);
+    if square == 0.0 {
+        return 0.0;
+    }
+    dot(node.area_m2, d) / (4.0 * PI * square * square.sqrt())
+}
+
+/// Adds B of a layer's element, that of the moment -v n dS.
+fn add_dipole(target_m: Point, node: &Node, value: f64, sum: &mut Point) {
+    let d = minus(target_m, node.place_m);
+    let square = dot(d, d);
+    let scale = MU_0_T_M_PER_A * value / (4.0 * PI * square * square.sqrt());
+    let along = 3.0 * dot(node.area_m2, d) / square;
+    for (i, sum) in sum.iter_mut().enumerate() {
+        *sum += scale * (node.area_m2[i] - along * d[i]);
+    }
+}

@@ -1,0 +1,173 @@
+//! `optimize --for`: the whole array, for shapes.
+
+use serde_json::Value;
+
+use crate::SEED;
+use fluxform_testing::place::Place;
+
+const FLAT: &str = "shapes/flat.toml";
+
+fn number(value: &Value, path: &str) -> f64 {
+    let found = path.split('/').fold(value, |value, key| &value[key]);
+    found.as_f64().unwrap_or_else(|| panic!("{path}: {found}"))
+}
+
+/// The options of a quick search of coil and pitch in air.
+const QUICK: [&str; 10] = [
+    "--vary",
+    "coil.inner_diameter_mm=6:30",
+    "--vary",
+    "array.pitch_mm=38:60",
+    "--evaluations",
+    "40",
+    "--starts",
+    "1",
+    "--format",
+    "json",
+];
+
+fn search<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    let mut arguments = vec!["optimize", SEED, "--for", FLAT];
+    arguments.extend(QUICK);
+    arguments.extend(more);
+    arguments
+}
+
+#[test]
+fn the_best_array_meets_its_limits_and_is_a_design() {
+    let place = Place::new();
+    let result = place.run(&search(&["--out", "best.toml"])).ends(0).json();
+    assert_eq!(result["status"], "done");
+    assert_eq!(result["certificate"]["kind"], "multistart");
+    assert!(number(&result, "gain") > 1.0, "{}", result["gain"]);
+    for limit in result["limits"].as_object().unwrap().values() {
+        assert_eq!(limit["met"], true, "{limit}");
+    }
+    let best = place
+        .run(&["evaluate", "best.toml", "--strict", "--format", "json"])
+        .ends(0)
+        .json();
+    let turns = number(&best, "coil/turns");
+    assert_eq!(turns, turns.round());
+    let lambda = place
+        .run(&["lambda", "best.toml", FLAT, "--format", "json"])
+        .ends(0)
+        .json();
+    let stated = result["shapes"][0]["lambda_n_per_m"].as_f64().unwrap();
+    assert!((number(&lambda, "lambda_n_per_m") / stated - 1.0).abs() < 1e-9);
+    place
+        .run(&["calibrate", "best.toml", FLAT, "--no-report"])
+        .ends(0);
+}
+
+/// A known answer: the pitch alone against a fine scan.
+#[test]
+fn the_pitch_alone_is_that_of_a_fine_scan() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 7.0");
+    place.write("air.toml", &text);
+    let result = place
+        .run(&[
+            "optimize",
+            "air.toml",
+            "--for",
+            FLAT,
+            "--vary",
+            "array.pitch_mm=38:70",
+            "--format",
+            "json",
+        ])
+        .ends(0)
+        .json();
+    let found = result["shapes"][0]["lambda_n_per_m"].as_f64().unwrap();
+    let at = |pitch: f64| {
+        let moved = text.replace("pitch_mm = 50.0", &format!("pitch_mm = {pitch}"));
+        place.write("scan.toml", &moved);
+        let lambda = place
+            .run(&["lambda", "scan.toml", FLAT, "--format", "json"])
+            .ends(0)
+            .json();
+        number(&lambda, "lambda_n_per_m")
+    };
+    let scanned = (0..=16)
+        .map(|k| at(38.0 + 2.0 * f64::from(k)))
+        .fold(0.0, f64::max);
+    assert!(found > scanned * (1.0 - 1e-4), "{found} {scanned}");
+    let exact = at(number(&result, "values/array.pitch_mm"));
+    assert!((found / exact - 1.0).abs() < 1e-9, "{found} {exact}");
+}
+
+/// A known answer: mirrored shapes ask for mirrored arrays.
+#[test]
+fn mirrored_shapes_give_mirrored_arrays() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    let text = text.replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 7.0");
+    place.write(
+        "two.toml",
+        &format!("{text}\n[search]\narray.move_mm = [-12.0, 12.0]\narray.symmetry = \"free\"\n"),
+    );
+    let wedge = place.text("shapes/wedge.toml");
+    place.write(
+        "shapes/mirrored.toml",
+        &wedge.replace(
+            "unit = \"mm\"",
+            "unit = \"mm\"\nrotate_deg = [0.0, 0.0, 180.0]",
+        ),
+    );
+    let gain = |shape: &str| {
+        let run = place.run(&[
+            "optimize",
+            "two.toml",
+            "--for",
+            shape,
+            "--evaluations",
+            "120",
+            "--format",
+            "json",
+        ]);
+        let result = run.ends(0).json();
+        let x = |group: usize| number(&result, &format!("values/array.move_{group}_mm"));
+        (number(&result, "gain"), [x(1), x(3)])
+    };
+    let ((one, moves), (other, mirrored)) =
+        (gain("shapes/wedge.toml"), gain("shapes/mirrored.toml"));
+    assert!((one / other - 1.0).abs() < 2e-3, "{one} {other}");
+    assert!(moves.iter().chain(&mirrored).all(|x| x.abs() <= 12.0));
+}
+
+#[test]
+fn an_earlier_run_is_taken_up_and_threads_do_not_matter() {
+    let place = Place::new();
+    let first = place
+        .run(&search(&["--journal", "kept.json", "--threads", "1"]))
+        .ends(0)
+        .out;
+    let again = place
+        .run(&search(&["--journal", "kept.json", "--threads", "2"]))
+        .ends(0)
+        .out;
+    assert_eq!(first, again);
+}
+
+#[test]
+fn what_cannot_be_searched_is_said_before_anything_is_computed() {
+    let place = Place::new();
+    for (vary, said) in [
+        ("array.pitch_mm=60:40", "holds no values"),
+        ("coil.inner_diameter_mm=34:36", "nearest"),
+        ("core.below_mm=0:20", "no core"),
+        ("array.pich_mm=40:60", "did you mean pitch_mm"),
+        ("array.pitch_mm=20:30", "pitch_m"),
+    ] {
+        let run = place
+            .run(&["optimize", SEED, "--for", FLAT, "--vary", vary])
+            .ends(3);
+        assert!(run.err.contains(said), "{vary}: {}", run.err);
+    }
+}

@@ -1,0 +1,146 @@
+//! What is uncertain of the display in use: flags, the design's section, and the felt error.
+
+use fluxform_testing::place::Place;
+use serde_json::Value;
+
+use crate::SEED;
+
+const GIVEN: [&str; 8] = [
+    "--sensor-error",
+    "4mm",
+    "--tilt",
+    "10deg",
+    "--heat",
+    "20C",
+    "--driver-error",
+    "2%",
+];
+
+fn flat(place: &Place) -> &'static str {
+    place.write(
+        "flat.toml",
+        "name = \"flat\"\nsurface = \"shapes/flat.stl\"\nunit = \"mm\"\n\
+         translate_mm = [0.0, 0.0, 50.0]\nforce = \"vertical-only\"\n[points]\n\
+         x_mm = [-40.0, 40.0, 9]\ny_mm = [-40.0, 40.0, 9]\n",
+    );
+    "flat.toml"
+}
+
+fn solved(place: &Place, design: &str, flags: &[&str]) -> Value {
+    let args = ["lambda", design, flat(place), "--format", "json"];
+    place.run(&[&args[..], flags].concat()).ends(0).json()
+}
+
+fn number(of: &Value, path: &str) -> f64 {
+    of.pointer(path)
+        .and_then(Value::as_f64)
+        .unwrap_or_else(|| panic!("{path} in {of}"))
+}
+
+/// Nothing said what a sensor or a finger costs, and least-power currents were all there was.
+#[test]
+fn a_sensor_that_is_four_millimetres_off_costs_less_with_currents_chosen_for_it() {
+    let place = Place::new();
+    let found = solved(&place, SEED, &GIVEN[..2]);
+    let study = &found["uncertainty"];
+    for kind in ["promised", "realised"] {
+        let of = |what: &str| number(study, &format!("/robust/error/{kind}/{what}"));
+        assert!(of("vertical") < 0.10 && of("sideways") < 0.06, "{study}");
+        let plain = number(study, &format!("/feedback/{kind}/expected"));
+        assert!(of("expected") < 0.9 * plain, "{study}");
+    }
+    let felt = &found["headline"]["felt"];
+    let error = number(&found, "/headline/force_error");
+    let total = number(felt, "/total/robust");
+    let promised = number(study, "/robust/error/promised/expected");
+    assert!((total - promised - error).abs() < 1e-12, "{felt}");
+    let missing = felt["not_modelled"].as_array().expect("a list");
+    assert!(
+        missing
+            .iter()
+            .any(|one| one.as_str().is_some_and(|one| one.starts_with("tilt")))
+    );
+    let plain = solved(&place, SEED, &[]);
+    assert_eq!(plain["uncertainty"], Value::Null);
+    assert!(
+        number(&plain, "/headline/felt/total/feedback") < 0.1,
+        "{}",
+        plain["headline"]["felt"]
+    );
+    assert!(number(&plain, "/headline/felt/total/static") > 0.2);
+}
+
+#[test]
+fn a_design_states_its_uncertainties_and_flags_take_their_place() {
+    let place = Place::new();
+    let seed = place.text(SEED);
+    let section =
+        "\n[uncertainty]\nsensor_mm = 4.0\ntilt_deg = 10.0\nheat_c = 20.0\ndriver_percent = 2.0\n";
+    place.write("uncertain.toml", &format!("{seed}{section}"));
+    let stated = solved(&place, "uncertain.toml", &[]);
+    let flagged = solved(&place, SEED, &GIVEN);
+    assert_eq!(stated["uncertainty"], flagged["uncertainty"]);
+    assert_eq!(
+        stated["uncertainty"]["causes"].as_array().map(Vec::len),
+        Some(4)
+    );
+    let exact = solved(
+        &place,
+        "uncertain.toml",
+        &["--tilt", "0", "--sensor-error", "0", "--heat", "0"],
+    );
+    let causes = exact["uncertainty"]["causes"].as_array().expect("a list");
+    assert_eq!(causes.len(), 1);
+    assert_eq!(causes[0]["cause"], "driver");
+    let text = place
+        .run(&["lambda", "uncertain.toml", "flat.toml"])
+        .ends(0)
+        .out;
+    for words in [
+        "finger",
+        "tilt of the finger 10 degrees: half",
+        "not modelled: ",
+        "chosen for the uncertainties",
+    ] {
+        assert!(text.contains(words), "{words} in {text}");
+    }
+}
+
+#[test]
+fn bounds_beyond_the_map_or_all_sense_are_refused() {
+    let place = Place::new();
+    let shape = flat(&place);
+    let refused = |code: i32, args: &[&str], words: &str| {
+        place.run(args).ends(code).says(&[words]);
+    };
+    refused(
+        3,
+        &["lambda", SEED, shape, "--sensor-error", "60mm"],
+        "between the magnet at the lowest point",
+    );
+    refused(
+        2,
+        &["lambda", SEED, shape, "--tilt", "100deg"],
+        "expected 0 to 90deg",
+    );
+    refused(
+        2,
+        &["lambda", SEED, shape, "--driver-error", "-2%"],
+        "expected 0 to 100",
+    );
+    refused(
+        2,
+        &["lambda", SEED, shape, "--heat", "warm"],
+        "expected 0 to 300C",
+    );
+    refused(
+        2,
+        &["lambda", SEED, shape, "--power-cap", "0W"],
+        "expected watts above 0",
+    );
+    refused(
+        3,
+        &["calibrate", SEED, shape, "--sensor-error", "25mm"],
+        "larger than the map's reach of 20 mm",
+    );
+}

@@ -1,0 +1,344 @@
+//! Felt errors under uncertainty: currents against trying every state of the coils, promises against random
+//! displays.
+
+use fluxform_base::uncertainty::{Cause, Uncertainty};
+use fluxform_lambda::ForceProblem;
+use fluxform_lambda::uncertainty::{
+    Drawn, Study, Surroundings, Turned, displacements_m, draws, robust_currents, study,
+};
+use fluxform_numerics::random::Random;
+use nalgebra::{DMatrix, DVector};
+
+/// Coils as vertical dipoles of one ampere, below the plane.
+const AXES_M: [[f64; 2]; 5] = [
+    [-0.04, -0.03],
+    [0.045, -0.035],
+    [-0.05, 0.04],
+    [0.04, 0.045],
+    [0.0, 0.005],
+];
+
+fn field_t(coil: usize, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [a, b] = AXES_M[coil];
+    let r = [x - a, y - b, z + 0.02];
+    let square = r.iter().map(|v| v * v).sum::<f64>();
+    let scale = 1.7e-6 / square.powf(2.5);
+    [
+        3.0 * r[0] * r[2] * scale,
+        3.0 * r[1] * r[2] * scale,
+        (3.0 * r[2] * r[2] - square) * scale,
+    ]
+}
+
+/// Forces on a magnet of 1.3 A m^2 that points up, and turned onto x and y.
+fn forces(place: [f64; 3]) -> Vec<Turned> {
+    const STEP_M: f64 = 1e-5;
+    let of = |coil| {
+        let slope = |axis: usize| {
+            let moved = |by: f64| {
+                let mut at = place;
+                at[axis] += by;
+                field_t(coil, at)
+            };
+            let (high, low) = (moved(STEP_M), moved(-STEP_M));
+            std::array::from_fn::<f64, 3, _>(|i| 1.3 * (high[i] - low[i]) / (2.0 * STEP_M))
+        };
+        let slopes = [0, 1, 2].map(slope);
+        // F_axis = d(m . B)/d axis, for moments along z, x and y.
+        let mut turned = [0.0; 9];
+        for (turn, along) in [2, 0, 1].into_iter().enumerate() {
+            for axis in 0..3 {
+                turned[3 * turn + axis] = slopes[axis][along];
+            }
+        }
+        turned
+    };
+    (0..AXES_M.len()).map(of).collect()
+}
+
+const LIMITS: ForceProblem = ForceProblem {
+    forces_n_per_a: &[],
+    height_m: &[],
+    offset_n: None,
+    weights: None,
+    lower_a: &[-0.3, 0.0, -2.0, 0.0, 0.0],
+    upper_a: &[2.0, 1.3, 2.0, 1.7, 0.4],
+    total_max_a: None,
+    resistance_ohm: &[6.0, 5.0, 6.5, 7.0, 6.0],
+};
+
+/// The least value over every state of the coils: at a limit or free, the sum free or at its limit.
+fn least_of_all_states(matrix: &DMatrix<f64>, linear: &DVector<f64>, total: Option<f64>) -> f64 {
+    let n = AXES_M.len();
+    let mut least = f64::INFINITY;
+    for state in 0..3_usize.pow(n as u32) * 2 {
+        let bound_sum = state % 2 == 1;
+        let of = |i: usize| (state / 2) / 3_usize.pow(i as u32) % 3;
+        if bound_sum && total.is_none() {
+            continue;
+        }
+        let free: Vec<usize> = (0..n).filter(|i| of(*i) == 1).collect();
+        let mut currents = DVector::from_fn(n, |i, _| match of(i) {
+            0 => LIMITS.lower_a[i],
+            1 => 0.0,
+            _ => LIMITS.upper_a[i],
+        });
+        let size = free.len() + usize::from(bound_sum);
+        let right = linear - matrix * &currents;
+        let mut system = DMatrix::zeros(size, size);
+        let mut values = DVector::zeros(size);
+        for (a, &i) in free.iter().enumerate() {
+            for (b, &j) in free.iter().enumerate() {
+                system[(a, b)] = matrix[(i, j)];
+            }
+            values[a] = right[i];
+            if bound_sum {
+                system[(a, free.len())] = 1.0;
+                system[(free.len(), a)] = 1.0;
+            }
+        }
+        if bound_sum {
+            values[free.len()] = total.unwrap_or(0.0) - currents.sum();
+        }
+        let solved = if size == 0 {
+            values
+        } else {
+            match system.lu().solve(&values) {
+                Some(solved) => solved,
+                None => continue,
+            }
+        };
+        for (a, &i) in free.iter().enumerate() {
+            currents[i] = solved[a];
+        }
+        let within = |i: usize| {
+            currents[i] >= LIMITS.lower_a[i] - 1e-12 && currents[i] <= LIMITS.upper_a[i] + 1e-12
+        };
+        if (0..n).all(within) && total.is_none_or(|total| currents.sum() <= total + 1e-12) {
+            least = least.min(currents.dot(&(matrix * &currents)) - 2.0 * linear.dot(&currents));
+        }
+    }
+    least
+}
+
+#[test]
+fn robust_currents_are_the_best_of_all_states_of_the_coils() {
+    let mut random = Random::new(18);
+    for case in 0..60 {
+        let given = Uncertainty {
+            sensor_m: 0.0,
+            tilt_deg: 12.0,
+            heat_c: 35.0,
+            driver: 0.03,
+        };
+        let moments = given.moments();
+        let total = (case % 3 == 0).then(|| random.between(0.3, 2.0));
+        let limits = ForceProblem {
+            total_max_a: total,
+            ..LIMITS
+        };
+        let request = [
+            random.between(-0.05, 0.05),
+            random.between(-0.05, 0.05),
+            random.between(0.0, 0.3),
+        ];
+        let price = random.decades(1e-9, 1e-4);
+        let places: Vec<(Vec<Turned>, f64, f64)> = [0.3, 0.7]
+            .map(|weight| {
+                let place = [
+                    random.between(-0.04, 0.04),
+                    random.between(-0.04, 0.04),
+                    random.between(0.02, 0.05),
+                ];
+                (forces(place), random.between(-0.02, 0.02), weight)
+            })
+            .to_vec();
+        let n = AXES_M.len();
+        let (mut matrix, mut linear) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for (field, pull, weight) in &places {
+            for turn in 0..3 {
+                let share = if turn == 0 {
+                    moments.along_square
+                } else {
+                    moments.across_square
+                };
+                for axis in 0..3 {
+                    let row = DVector::from_fn(n, |i, _| field[i][3 * turn + axis]);
+                    let square = weight * moments.gain_square * share;
+                    matrix += &row * row.transpose() * square;
+                    for i in 0..n {
+                        matrix[(i, i)] += square * moments.driver_square * row[i] * row[i];
+                    }
+                    if turn == 0 {
+                        let wanted = request[axis] - if axis == 2 { *pull } else { 0.0 };
+                        linear += row * (weight * moments.gain * moments.along * wanted);
+                    }
+                }
+            }
+        }
+        for i in 0..n {
+            matrix[(i, i)] += price * LIMITS.resistance_ohm[i];
+        }
+        let mut currents = vec![0.0; n];
+        let around = places
+            .iter()
+            .map(|(field, pull, weight)| (&field[..], *pull, *weight));
+        robust_currents(
+            &limits,
+            &given,
+            (request, true),
+            around,
+            price,
+            &mut currents,
+        );
+        let found = DVector::from_vec(currents.clone());
+        let value = found.dot(&(&matrix * &found)) - 2.0 * linear.dot(&found);
+        let least = least_of_all_states(&matrix, &linear, total);
+        assert!(
+            total.is_none_or(|total| found.sum() <= total * (1.0 + 1e-11)),
+            "case {case}"
+        );
+        assert!(
+            (value - least).abs() <= 1e-9 * least.abs(),
+            "case {case}: {value} {least} {currents:?}"
+        );
+    }
+}
+
+/// A bent surface under the given uncertainties.
+fn of_surface(given: &Uncertainty, vector: bool, cap_w: Option<f64>) -> Study {
+    let mut positions = Vec::new();
+    for i in 0..8 {
+        for j in 0..7 {
+            let (x, y) = (0.009 * f64::from(i) - 0.031, 0.01 * f64::from(j) - 0.028);
+            positions.push([x, y, 0.034 - 6.0 * (x * x + 0.7 * y * y)]);
+        }
+    }
+    let heights: Vec<f64> = positions.iter().map(|place| place[2]).collect();
+    let around = displacements_m(given);
+    let moved = |place: [f64; 3], by: [f64; 3]| std::array::from_fn(|axis| place[axis] + by[axis]);
+    let fields: Vec<Turned> = (positions.iter())
+        .flat_map(|place| around.iter().flat_map(|by| forces(moved(*place, *by))))
+        .collect();
+    let drawn = draws(given, positions.len(), AXES_M.len(), 1000);
+    let of_draws: Vec<Turned> = (drawn.iter())
+        .flat_map(|draw| forces(moved(positions[draw.point], draw.displacement_m)))
+        .collect();
+    let none = vec![0.0; positions.len() * AXES_M.len()];
+    let surroundings = Surroundings {
+        problem: ForceProblem {
+            forces_n_per_a: &none,
+            height_m: &heights,
+            ..LIMITS
+        },
+        direction: &vec![[0.0, 0.0, 1.0]; positions.len()],
+        vector,
+        fields: &fields,
+        pull_n: None,
+    };
+    let drawn = Drawn {
+        draws: &drawn,
+        fields: &of_draws,
+        pull_n: None,
+    };
+    let fixed = [0.5, 0.4, 0.6, 0.5, 0.3];
+    let found = study(&surroundings, 0.9, &fixed, (given, cap_w), &drawn);
+    found.expect("sound").expect("a force is requested")
+}
+
+const ALL: Uncertainty = Uncertainty {
+    sensor_m: 0.004,
+    tilt_deg: 10.0,
+    heat_c: 20.0,
+    driver: 0.02,
+};
+
+#[test]
+fn a_thousand_random_displays_give_what_is_promised() {
+    for (vector, given) in [
+        (true, ALL),
+        (false, ALL),
+        (true, ALL.only(Cause::Tilt)),
+        (true, ALL.only(Cause::Driver)),
+    ] {
+        let found = of_surface(&given, vector, None);
+        let of_all = [
+            found.fixed,
+            found.feedback,
+            found.robust_static.error,
+            found.robust.error,
+        ];
+        for (kind, error) in of_all.iter().enumerate() {
+            let (promised, realised) = (error.promised, error.realised);
+            for (p, r) in [
+                (promised.expected, realised.expected),
+                (promised.vertical, realised.vertical),
+                (promised.sideways, realised.sideways),
+            ] {
+                assert!((p / r - 1.0).abs() < 0.06, "{kind}: {p} {r}, {given:?}");
+            }
+            assert!(
+                realised.worst <= promised.worst * (1.0 + 1e-9),
+                "{kind}: {error:?}"
+            );
+        }
+        let aim = |error: &fluxform_lambda::uncertainty::FeltError| {
+            if vector {
+                error.expected
+            } else {
+                error.vertical
+            }
+        };
+        assert!(aim(&found.robust.error.promised) <= 1.05 * aim(&found.feedback.promised));
+    }
+}
+
+#[test]
+fn more_power_never_errs_more_and_a_cap_holds() {
+    let free = of_surface(&ALL, true, None);
+    for setting in [&free.robust, &free.robust_static] {
+        for pair in setting.trade_off.windows(2) {
+            assert!(pair[1].mean_power_w >= pair[0].mean_power_w * (1.0 - 1e-12));
+            assert!(pair[1].expected <= pair[0].expected * (1.0 + 1e-12));
+        }
+    }
+    let most = free.robust.trade_off.last().expect("a curve").mean_power_w;
+    for share in [0.02, 0.4, 0.9, 3.0] {
+        let capped = of_surface(&ALL, true, Some(share * most)).robust;
+        let power = capped.error.promised.mean_power_w;
+        assert!(power <= share * most * (1.0 + 1e-9), "{power} {most}");
+        assert!(
+            power >= 0.99 * share.min(1.0) * most,
+            "{power} of {}",
+            share * most
+        );
+    }
+}
+
+#[test]
+fn causes_are_ranked_by_what_halving_them_gains() {
+    let found = of_surface(&ALL, true, None);
+    assert_eq!(found.causes.len(), 4);
+    assert_eq!(found.causes[0].cause, Cause::Sensor);
+    let gains: Vec<f64> = found
+        .causes
+        .iter()
+        .map(|cost| cost.halving_gains.feedback)
+        .collect();
+    assert!(
+        gains.is_sorted_by(|a, b| a >= b) && gains[1] > 0.0,
+        "{gains:?}"
+    );
+    // Squares of independent causes add up, but that heat also weakens the mean.
+    let squares: f64 = found
+        .causes
+        .iter()
+        .map(|cost| cost.alone.feedback.powi(2))
+        .sum();
+    let all = found.feedback.promised.expected.powi(2) - found.exact.feedback.powi(2);
+    assert!((squares / all - 1.0).abs() < 0.1, "{squares} {all}");
+    // Nothing uncertain: feedback within reach is exact, and nobody gains.
+    let exact = of_surface(&Uncertainty::default(), true, None);
+    assert!(exact.causes.is_empty());
+    assert!((exact.feedback.promised.expected - found.exact.feedback).abs() < 1e-9);
+}
