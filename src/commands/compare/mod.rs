@@ -199,13 +199,7 @@ pub fn run(
     options: &CompareOptions,
     progress: &dyn Progress,
 ) -> Result<CompareReport, RunError> {
-    for (i, shape) in shapes.iter().enumerate() {
-        let name = &shape.document.name;
-        if shapes[..i].iter().any(|other| other.document.name == *name) {
-            let message = format!("two shapes are called {name:?}: rename one");
-            return Err(RunError::Input(message));
-        }
-    }
+    check_names(shapes)?;
     let scene = Scene::with_tolerance(design, options.tolerance)?;
     let of_shapes = shapes.iter().filter_map(|shape| shape.input.clone());
     let inputs: Vec<Input> = std::iter::once(design_input.clone())
@@ -275,6 +269,19 @@ pub fn run(
         accuracy,
         warnings,
     })
+}
+
+/// # Errors
+/// Two shapes of one name.
+fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
+    for (i, shape) in shapes.iter().enumerate() {
+        let name = &shape.document.name;
+        if shapes[..i].iter().any(|other| other.document.name == *name) {
+            let message = format!("two shapes are called {name:?}: rename one");
+            return Err(RunError::Input(message));
+        }
+    }
+    Ok(())
 }
 
 impl Object {

@@ -336,8 +336,8 @@ fn first_eighth([x, y]: [f64; 2]) -> [f64; 2] {
 /// How the exchange is applied to all cores.
 enum Exchange {
     Lattice {
-        potentials: BlockToeplitz,
-        flux: BlockToeplitz,
+        potentials: Box<BlockToeplitz>,
+        flux: Box<BlockToeplitz>,
     },
     Pairs,
 }
@@ -519,13 +519,17 @@ impl<'a> ReducedCoupling<'a> {
         let offset = |step: [isize; 2]| [0, 1].map(|axis| step[axis] as f64 * pitch_m[axis]);
         let (received, felt) = (self.received.waves.len(), self.felt.waves.len());
         Exchange::Lattice {
-            potentials: BlockToeplitz::new(cells, (received, felt), |step, block| {
-                self.put_block(offset(step), block);
-            }),
-            flux: BlockToeplitz::new(cells, (1, received), |step, block| {
+            potentials: Box::new(BlockToeplitz::new(
+                cells,
+                (received, felt),
+                |step, block| {
+                    self.put_block(offset(step), block);
+                },
+            )),
+            flux: Box::new(BlockToeplitz::new(cells, (1, received), |step, block| {
                 // From the coil to the core.
                 self.put_flux(offset(step).map(|x| -x), block);
-            }),
+            })),
         }
     }
 
