@@ -729,10 +729,6 @@ mod tests {
             layer = layer.max((&a - b).amax());
             size = size.max(a.amax());
         }
-        println!(
-            "{cores} {tolerance:e}: {inductance:.1e} {:.1e}",
-            layer / size
-        );
         assert!(
             inductance < 0.1 * tolerance,
             "{cores} {tolerance:e}: {inductance:e}"
