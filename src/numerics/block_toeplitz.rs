@@ -10,7 +10,9 @@ use rustfft::{Fft, FftPlanner};
 
 /// Pairs of columns that are transformed together; fixed, so that memory is bounded and bytes do not
 /// depend on threads.
-const PAIRS: usize = 16;
+const PAIRS: usize = 32;
+/// Frequencies that are multiplied one after the other: as many numbers as a few lines of the cache have.
+const BESIDE: usize = 8;
 
 /// The sum over all cells `j` of a block for the step from `j` to `i`, applied at `j`, for every cell `i`.
 pub struct BlockToeplitz {
@@ -52,7 +54,7 @@ impl BlockToeplitz {
             .flat_map(|pair| (0..rows).map(move |row| (row, 2 * pair)))
             .collect();
         let mut spectrum = vec![DMatrix::zeros(2 * rows, columns); half];
-        for entries in entries.chunks(PAIRS * 16) {
+        for entries in entries.chunks(PAIRS * 8) {
             let transformed: Vec<Vec<Complex<f64>>> = entries
                 .par_iter()
                 .map(|&(row, column)| {
@@ -121,52 +123,24 @@ impl BlockToeplitz {
                 plane
             })
             .collect();
-        // Blocks of opposite frequencies are conjugate.
-        let half = self.spectrum.len();
-        let products: Vec<[DMatrix<f64>; 2]> = (0..half)
-            .into_par_iter()
-            .map(|k| {
-                let both = [k, self.plane.opposite(k)];
-                // Real parts of the one frequency, imaginary ones, then those of the other.
-                let given = DMatrix::from_fn(self.columns, 4 * pairs, |channel, column| {
-                    let value =
-                        spectra[column % pairs * self.columns + channel][both[column / pairs / 2]];
-                    if (column / pairs).is_multiple_of(2) {
-                        value.re
-                    } else {
-                        value.im
-                    }
-                });
-                let product = &self.spectrum[k] * given;
-                let (re, im) = (
-                    product.rows(0, self.rows),
-                    product.rows(self.rows, self.rows),
-                );
-                [0, 1].map(|of| {
-                    let sign = if of == 0 { 1.0 } else { -1.0 };
-                    let (real, imaginary) = (2 * of * pairs, (2 * of + 1) * pairs);
-                    DMatrix::from_fn(self.rows, 2 * pairs, |row, column| {
-                        if column < pairs {
-                            re[(row, real + column)] - sign * im[(row, imaginary + column)]
-                        } else {
-                            let column = column - pairs;
-                            re[(row, imaginary + column)] + sign * im[(row, real + column)]
-                        }
-                    })
-                })
-            })
+        // Several frequencies at a time: a plane is read by whole lines of the processor's cache.
+        let starts: Vec<usize> = (0..self.spectrum.len()).step_by(BESIDE).collect();
+        let products: Vec<Vec<[Complex<f64>; 2]>> = starts
+            .par_iter()
+            .map(|start| self.products(*start, pairs, &spectra))
             .collect();
+        drop(spectra);
         let scale = 1.0 / self.plane.size() as f64;
         let planes: Vec<Vec<Complex<f64>>> = (0..self.rows * pairs)
             .into_par_iter()
             .map(|index| {
                 fluxform_base::progress::poll();
-                let (row, pair) = (index % self.rows, index / self.rows);
                 let mut plane = vec![Complex::default(); self.plane.size()];
-                for (k, both) in products.iter().enumerate() {
-                    for (place, product) in [k, self.plane.opposite(k)].into_iter().zip(both) {
-                        plane[place] =
-                            Complex::new(product[(row, pair)], product[(row, pair + pairs)]);
+                for (start, products) in starts.iter().zip(&products) {
+                    let of_plane = products.chunks_exact(products.len() / (self.rows * pairs));
+                    for (k, [one, other]) in of_plane.skip(index).take(1).flatten().enumerate() {
+                        plane[self.plane.opposite(start + k)] = *other;
+                        plane[start + k] = *one;
                     }
                 }
                 self.plane.transform(&mut plane, true);
@@ -183,6 +157,48 @@ impl BlockToeplitz {
                 }
             }
         }
+    }
+
+    /// Products at some frequencies from `start` on and at their opposites, [row of a pair, frequency], of
+    /// what every channel of every pair of columns has there.
+    fn products(
+        &self,
+        start: usize,
+        pairs: usize,
+        spectra: &[Vec<Complex<f64>>],
+    ) -> Vec<[Complex<f64>; 2]> {
+        fluxform_base::progress::poll();
+        let blocks = &self.spectrum[start..self.spectrum.len().min(start + BESIDE)];
+        // Real parts of every frequency, imaginary ones, then those of its opposite.
+        let mut given = vec![DMatrix::zeros(self.columns, 4 * pairs); blocks.len()];
+        for (index, plane) in spectra.iter().enumerate() {
+            let (channel, pair) = (index % self.columns, index / self.columns);
+            for (k, given) in given.iter_mut().enumerate() {
+                let (one, other) = (plane[start + k], plane[self.plane.opposite(start + k)]);
+                for (part, value) in [one.re, one.im, other.re, other.im].into_iter().enumerate() {
+                    given[(channel, part * pairs + pair)] = value;
+                }
+            }
+        }
+        let mut out = vec![[Complex::default(); 2]; self.rows * pairs * blocks.len()];
+        for (k, (block, given)) in blocks.iter().zip(&given).enumerate() {
+            let product = block * given;
+            for pair in 0..pairs {
+                for row in 0..self.rows {
+                    let at = |part: usize| {
+                        let column = part * pairs + pair;
+                        (product[(row, column)], product[(self.rows + row, column)])
+                    };
+                    // Blocks of opposite frequencies are conjugate.
+                    let ([re, im], [opposite_re, opposite_im]) = ([at(0), at(1)], [at(2), at(3)]);
+                    out[(pair * self.rows + row) * blocks.len() + k] = [
+                        Complex::new(re.0 - im.1, im.0 + re.1),
+                        Complex::new(opposite_re.0 + opposite_im.1, opposite_im.0 - opposite_re.1),
+                    ];
+                }
+            }
+        }
+        out
     }
 }
 

@@ -113,7 +113,7 @@ pub const LAWS: [Spec; 20] = [
         "coupled-array",
         "coils",
         COILS,
-        &[1, 2, 3, 4, 5, 6],
+        &[1, 2, 3, 4, 5, 6, 8, 10, 15, 30],
         coupled,
     ),
     spec(
