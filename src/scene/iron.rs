@@ -227,6 +227,20 @@ impl SceneIron {
     }
 }
 
+/// Refuses steel beyond the cores for a command that takes one coil alone.
+///
+/// # Errors
+/// A design that has any.
+pub fn without_iron(design: &Design, command: &str) -> Result<(), RunError> {
+    if design.has_iron() {
+        return Err(RunError::Input(format!(
+            "{command} computes one coil with its core alone: take [plate] and [[iron]] out; `evaluate` and \
+             `lambda` of several designs compare plates"
+        )));
+    }
+    Ok(())
+}
+
 fn chi(steel: LinearSteel) -> f64 {
     steel.relative_permeability - 1.0
 }

@@ -13,6 +13,7 @@ use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
 use crate::field::components::Components;
+use crate::field::iron::array::IronPeaks;
 use crate::field::steel::core_flux_density::peak_depth_m;
 
 /// The array's inductances.
@@ -49,6 +50,25 @@ pub struct IronSummary {
     pub knee_t: f64,
     /// Five time constants of the slowest coil among all steel, s.
     pub settling_s: f64,
+}
+
+fn iron_summary(
+    scene: &Scene,
+    matrix: &[Vec<f64>],
+    peaks: &IronPeaks,
+    warnings: &mut Vec<String>,
+) -> Option<IronSummary> {
+    let iron = scene.iron.as_ref()?;
+    warnings.extend(iron.above_knee(scene, peaks, "all coils at their rated currents"));
+    let alone = "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
+                 has the coils among all steel";
+    warnings.push(alone.to_owned());
+    Some(IronSummary {
+        peak_field_t: peaks.elsewhere.0,
+        peak_at_m: peaks.elsewhere.1,
+        knee_t: iron.knee_t,
+        settling_s: settling_s(scene, matrix),
+    })
 }
 
 fn settling_s(scene: &Scene, matrix: &[Vec<f64>]) -> f64 {
@@ -130,25 +150,13 @@ pub(crate) fn array(
             "a core of the array with all coils at their rated currents",
         ));
     }
-    let iron = match &scene.iron {
-        Some(iron) => {
-            let peaks = iron.peaks(&solved, &scene.upper_a)?;
-            warnings.extend(iron.above_knee(scene, &peaks, "all coils at their rated currents"));
-            warnings.push(
-                "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
-                 has the coils among all steel"
-                    .to_owned(),
-            );
-            peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
-            Some(IronSummary {
-                peak_field_t: peaks.elsewhere.0,
-                peak_at_m: peaks.elsewhere.1,
-                knee_t: iron.knee_t,
-                settling_s: settling_s(scene, &matrix),
-            })
-        }
-        None => None,
-    };
+    let peaks = (scene.iron.as_ref())
+        .map(|iron| iron.peaks(&solved, &scene.upper_a))
+        .transpose()?;
+    let iron = peaks.and_then(|peaks| {
+        peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
+        iron_summary(scene, &matrix, &peaks, warnings)
+    });
     let coils = axes
         .iter()
         .enumerate()

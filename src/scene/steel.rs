@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::core_material::{Material, SceneCore};
+use super::iron::SceneIron;
 use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
@@ -282,15 +283,7 @@ pub(crate) fn clearance_of_m(
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
 pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, RunError> {
     if let Some(iron) = &scene.iron {
-        let array = iron.solve(scene, STEEL_SHARE * tolerance, lowest_m)?;
-        return Ok(Solved {
-            tolerance,
-            steel_error: array.relative_error,
-            steel: Steel::Iron(Box::new(array)),
-            relative_permeability: (scene.core.as_ref())
-                .map_or(1.0, SceneCore::relative_permeability),
-            prepared: PreparedField::default(),
-        });
+        return solve_iron(scene, iron, tolerance, lowest_m);
     }
     let Some(core) = &scene.core else {
         return Ok(Solved::in_air(tolerance));
@@ -366,6 +359,23 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         steel_error,
         steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
+        prepared: PreparedField::default(),
+    })
+}
+
+fn solve_iron(
+    scene: &Scene,
+    iron: &SceneIron,
+    tolerance: f64,
+    lowest_m: f64,
+) -> Result<Solved, RunError> {
+    let array = iron.solve(scene, STEEL_SHARE * tolerance, lowest_m)?;
+    let core = scene.core.as_ref();
+    Ok(Solved {
+        tolerance,
+        steel_error: array.relative_error,
+        steel: Steel::Iron(Box::new(array)),
+        relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
         prepared: PreparedField::default(),
     })
 }

@@ -97,16 +97,13 @@ impl IronArray {
     /// # Errors
     /// A node on a winding's edge.
     pub fn at_resolution(
-        Coils {
-            winding,
-            positions_m,
-            ..
-        }: Coils<'_>,
+        coils: Coils<'_>,
         iron: &Iron,
         tolerance: f64,
         tier: usize,
     ) -> Result<Self, OnEdge> {
         let resolution = iron.resolution(RESOLUTIONS[tier]);
+        let positions_m = coils.positions_m;
         let surface = Surface::new(iron.part(), &resolution);
         let images = iron.images();
         let planes_m = iron.planes_m;
@@ -121,32 +118,8 @@ impl IronArray {
                     }
             })
             .collect();
-        let node_at = |image: usize, node: &Node| mirrored(node, images[image], planes_m);
-        // The windings' potential at every node of every image.
-        let potentials: Vec<DMatrix<f64>> = (0..images.len())
-            .map(|image| {
-                let columns: Vec<f64> = firsts
-                    .iter()
-                    .flat_map(|drive| {
-                        let [x, y] = positions_m[*drive];
-                        let of_node = |(number, node): (usize, &Node)| {
-                            let [px, py, pz] = node_at(image, node).place_m;
-                            let bore = surface.face_of(number).bore;
-                            let in_bore = bore.is_some_and(|own| {
-                                moved(positions_m, own, images[image], planes_m) == *drive
-                            });
-                            winding.potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
-                        };
-                        surface
-                            .nodes
-                            .par_iter()
-                            .enumerate()
-                            .map(of_node)
-                            .collect::<Vec<f64>>()
-                    })
-                    .collect();
-                DMatrix::from_vec(surface.size(), firsts.len(), columns)
-            })
+        let potentials: Vec<DMatrix<f64>> = (images.iter())
+            .map(|signs| potentials(&surface, coils, &firsts, *signs, planes_m))
             .collect();
         let solved = system.solve(&potentials, SOLVER_SHARE * tolerance);
         // Every drive from the first of its like.
@@ -167,7 +140,7 @@ impl IronArray {
             .collect();
         let mut array = Self {
             positions_m: positions_m.to_vec(),
-            winding,
+            winding: coils.winding,
             surface,
             images,
             planes_m,
@@ -355,6 +328,33 @@ impl ArraySteel for IronArray {
     fn iron(&self) -> Option<&IronArray> {
         Some(self)
     }
+}
+
+/// The potential of the windings `firsts` at every node of one mirrored copy, [node, winding].
+fn potentials(
+    surface: &Surface,
+    coils: Coils<'_>,
+    firsts: &[usize],
+    signs: [f64; 2],
+    planes_m: [f64; 2],
+) -> DMatrix<f64> {
+    let positions_m = coils.positions_m;
+    let of_winding = |drive: &usize| {
+        let [x, y] = positions_m[*drive];
+        let of_node = |(number, node): (usize, &Node)| {
+            let [px, py, pz] = mirrored(node, signs, planes_m).place_m;
+            let bore = surface.face_of(number).bore;
+            let in_bore =
+                bore.is_some_and(|own| moved(positions_m, own, signs, planes_m) == *drive);
+            coils
+                .winding
+                .potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
+        };
+        let nodes = surface.nodes.par_iter().enumerate();
+        nodes.map(of_node).collect::<Vec<f64>>()
+    };
+    let columns: Vec<f64> = firsts.iter().flat_map(of_winding).collect();
+    DMatrix::from_vec(surface.size(), firsts.len(), columns)
 }
 
 /// A drive as the mirror image of the first of its like.
