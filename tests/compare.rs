@@ -204,7 +204,7 @@ fn where_nothing_can_be_rendered_nothing_is_compared() {
     assert_eq!(file.without_constant(), ["a", "b"]);
     assert_eq!(file.pairs[0].static_jnd, None);
     assert_eq!(file.pairs[0].feedback_at, None);
-    assert!(!file.picture().svg().contains("NaN"));
+    assert!(!file.picture().drawing().svg().contains("NaN"));
 }
 
 fn the_bytes_do_not_depend_on_threads() {

@@ -12,9 +12,24 @@ use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, write};
 use crate::design::message_text::shown_path;
+use crate::plot::drawing::{Drawing, DrawingFormat};
 
 /// How the first line of a drawing or a page begins.
 const MARK: &str = "<!-- fluxform, drawn of ";
+
+/// Standard output takes the table or the drawing.
+///
+/// # Errors
+/// Wrong usage: both.
+pub fn table_or_drawing(out: &FileArgument, plot: Option<&FileArgument>) -> Result<(), Failure> {
+    if out.is_standard() && plot.is_some_and(FileArgument::is_standard) {
+        return Err(Failure::Usage(
+            "--out and --plot both go to standard output (-); name a file for one of them"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
 
 /// A drawing or a page that a run is to make, and what of its files it must not replace.
 #[derive(Debug)]
@@ -48,13 +63,37 @@ impl<'a> Picture<'a> {
             FileArgument::Standard => Ok(()),
             FileArgument::Path(path) if atomic::is_stream(path) => Ok(()),
             FileArgument::Path(path) => {
-                let overwrite = self.overwrite(MARK, inputs);
+                // Text alone states what it was drawn of.
+                let mark = match self.format() {
+                    DrawingFormat::Svg => MARK,
+                    DrawingFormat::Png | DrawingFormat::Pdf => "",
+                };
+                let overwrite = self.overwrite(mark, inputs);
                 Ok(overwrite.check(path).map_err(RunError::from)?)
             }
         }
     }
 
-    /// Writes it, whole or not at all. Returns where a summary may still go.
+    /// Draws it in the format that its ending names. Returns where a summary may still go.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn draw(
+        &self,
+        inputs: &[Input],
+        drawing: &Drawing,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        match self.format() {
+            DrawingFormat::Svg => self.write(inputs, &drawing.svg(), printer),
+            format => {
+                let bytes = drawing.bytes(format).map_err(Failure::Input)?;
+                self.write_marked("", inputs, &bytes, printer)
+            }
+        }
+    }
+
+    /// Writes a text, whole or not at all. Returns where a summary may still go.
     ///
     /// # Errors
     /// See [`Failure`].
@@ -64,22 +103,39 @@ impl<'a> Picture<'a> {
         text: &str,
         printer: &Printer,
     ) -> Result<Stream, Failure> {
+        let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
+        let mark = format!("{MARK}{} -->\n", digests.join(" "));
+        self.write_marked(&mark, inputs, text.as_bytes(), printer)
+    }
+
+    fn write_marked(
+        &self,
+        mark: &str,
+        inputs: &[Input],
+        content: &[u8],
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
         let path = match self.file {
             FileArgument::Standard => {
-                printer.data(|out| out.write_all(text.as_bytes()))?;
+                printer.data(|out| out.write_all(content))?;
                 return Ok(Stream::Error);
             }
             FileArgument::Path(path) => path,
         };
-        let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
-        let mark = format!("{MARK}{} -->\n", digests.join(" "));
-        write(path, &self.overwrite(&mark, inputs), |out| {
+        write(path, &self.overwrite(mark, inputs), |out| {
             out.write_all(mark.as_bytes())?;
-            out.write_all(text.as_bytes())
+            out.write_all(content)
         })
         .map_err(RunError::from)?;
         printer.notice(&format!("written: {}", shown_path(path)));
         Ok(Stream::Output)
+    }
+
+    /// By the file's ending; pages, which have their own, are texts as SVG is.
+    fn format(&self) -> DrawingFormat {
+        let ending = self.file.as_given().extension();
+        let named = ending.and_then(|ending| DrawingFormat::of(ending.to_str()?));
+        named.unwrap_or(DrawingFormat::Svg)
     }
 
     fn overwrite(&self, mark: &str, inputs: &[Input]) -> Overwrite {

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use crate::bundle::atomic;
 use crate::choice::Choice;
+use crate::plot::drawing::DrawingFormat;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{parse_unit, unit_names};
 use crate::uncertainty::Uncertainty;
@@ -63,6 +65,23 @@ impl FileArgument {
     pub fn is_standard(&self) -> bool {
         *self == Self::Standard
     }
+}
+
+/// A drawing's file: SVG, PNG or PDF by its ending, or `-` for SVG on standard output.
+pub fn picture(text: &str) -> Result<FileArgument, String> {
+    let file = FileArgument::from(OsString::from(text));
+    let path = file.as_given();
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let known = ending.is_some_and(|ending| DrawingFormat::of(ending).is_some());
+    if file.is_standard() || known || atomic::is_stream(path) {
+        return Ok(file);
+    }
+    let endings = DrawingFormat::ALL.map(|(ending, _)| format!(".{ending}"));
+    Err(format!(
+        "the ending decides how it is drawn: expected one of {}, like {}",
+        endings.join(", "),
+        path.with_extension("svg").display()
+    ))
 }
 
 /// Samples along x and y.

@@ -4,6 +4,7 @@ pub mod at_current;
 pub mod cached_field;
 pub mod core_material;
 pub mod cost;
+pub mod drawing;
 pub mod evaluation_sample;
 pub mod felt_force;
 pub mod iron;

@@ -93,7 +93,7 @@ pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), Run
     }
     for stage in &file.stages {
         let name = format!("{}.svg", stage.stage);
-        let svg = picture(stage).svg();
+        let svg = picture(stage).drawing().svg();
         let drawn = set.write(&name, |out| out.write_all(svg.as_bytes()))?;
         entries.push(FileEntry::new(name, drawn));
     }

@@ -43,7 +43,7 @@ pub fn pictures(file: &BenchFile) -> Vec<(String, String)> {
         .flat_map(|shape| SHOWN.iter().map(move |shown| (shape, shown)))
         .map(|(shape, shown)| {
             let name = format!("{}_{}.svg", shape.shape, shown.name);
-            (name, picture(shape, shown).svg())
+            (name, picture(shape, shown).drawing().svg())
         })
         .collect()
 }

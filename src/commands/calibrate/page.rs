@@ -8,6 +8,7 @@ use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
 use crate::scene::Scene;
+use crate::scene::drawing::drawing;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// The page's input: what the bundle will hold, and what the scene adds. `tolerance` is that of the
@@ -28,6 +29,7 @@ pub(super) fn object<'a>(
         map: content.map,
         curves,
         directions,
+        array: drawing(scene.design),
         section: CoilPlan {
             inner_radius_m: 0.5 * scene.coil.inner_diameter_m,
             outer_radius_m: 0.5 * scene.coil.outer_diameter_m,

@@ -52,8 +52,8 @@ pub struct Compare {
     #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,
-    /// Draw the differences as matrices to this SVG file, `-` for standard output
-    #[arg(long, value_name = "FILE")]
+    /// Draw the differences as matrices to this file (.svg, .png or .pdf), `-` for standard output
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
     #[command(flatten)]
     tolerance: Tolerance,
@@ -99,7 +99,7 @@ impl Compare {
         }
         let mut place = Stream::Output;
         if let Some(plot) = &plot {
-            place = plot.write(&report.inputs, &report.picture().svg(), printer)?;
+            place = plot.draw(&report.inputs, &report.picture().drawing(), printer)?;
         }
         printer.summary(place, &printer.with_warnings(&report), || summary(&report))?;
         accuracy_check(&report.accuracy_missed)?;

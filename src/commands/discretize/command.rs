@@ -16,7 +16,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::pictures::Picture;
+use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, length_error, mm, number};
 use crate::cli::start::begin;
@@ -91,8 +91,9 @@ pub struct Discretize {
         requires = "inspect"
     )]
     pub(super) over: Option<FileArgument>,
-    /// Draw heights, what each point is, and the deviation between them (SVG)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
+    /// Draw heights, what each point is, and the deviation between them (.svg, .png
+    /// or .pdf)
+    #[arg(long, value_name = "FILE", value_parser = values::picture, conflicts_with_all = ["max_deviation", "poisson"])]
     pub(super) plot: Option<FileArgument>,
     #[command(flatten)]
     pub(super) writing: Writing,
@@ -106,13 +107,7 @@ impl Discretize {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
-        let both = self.plot.as_ref().is_some_and(FileArgument::is_standard);
-        if both && self.out.is_standard() {
-            return Err(Failure::Usage(
-                "--out and --plot both go to standard output (-); name a file for one of them"
-                    .to_owned(),
-            ));
-        }
+        table_or_drawing(&self.out, self.plot.as_ref())?;
         if self.inspect {
             return self.inspected(printer);
         }
@@ -157,8 +152,8 @@ impl Discretize {
             let place = match &plot {
                 None => place,
                 Some(plot) => {
-                    let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
-                    let after = plot.write(inputs, &svg, printer)?;
+                    let (inputs, drawn) = (&report.summary.inputs, report.picture().drawing());
+                    let after = plot.draw(inputs, &drawn, printer)?;
                     if after == Stream::Error { after } else { place }
                 }
             };

@@ -31,7 +31,7 @@ impl Discretize {
             let surface = inspection.inputs.last().map(|input| Path::new(&input.path));
             let plot = Picture::new(file, self.writing.force, surface);
             plot.check(&inspection.inputs)?;
-            place = plot.write(&inspection.inputs, &drawn.svg(), printer)?;
+            place = plot.draw(&inspection.inputs, &drawn.drawing(), printer)?;
         }
         printer.summary(place, &inspection, || self.report(&inspection))
     }

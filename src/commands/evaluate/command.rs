@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::{Evaluation, LimitedBy, Transient, evaluate};
 use crate::accuracy::StageAccuracy;
-use crate::cli::args::Tolerance;
+use crate::cli::args::{Tolerance, Writing};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -12,13 +12,15 @@ use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row};
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_with_error};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
-use crate::cli::values::FileArgument;
+use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
+use crate::scene::drawing::drawing;
 use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
 use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 
@@ -46,6 +48,12 @@ pub struct Evaluate {
     /// End with exit code 4 when a limit is not met
     #[arg(long)]
     strict: bool,
+    /// Draw the array to scale, from above and cut along a row (.svg, .png or .pdf); `-` for standard
+    /// output
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot: Option<FileArgument>,
+    #[command(flatten)]
+    writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
 }
@@ -58,6 +66,11 @@ impl Evaluate {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
         let design = &document.design;
+        let force = self.writing.force;
+        let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));
+        if let Some(plot) = &plot {
+            plot.check(std::slice::from_ref(&document.input))?;
+        }
         let steel = of_steel(design, self.tolerance.tolerance);
         allow(steel, CostOrigin::Document, printer)?;
         let bar = begin(printer);
@@ -67,7 +80,11 @@ impl Evaluate {
             printer.warning(warning);
         }
         let json = printer.with_warnings(&result);
-        printer.summary(Stream::Output, &json, || summary(design, &result))?;
+        let mut place = Stream::Output;
+        if let (Some(plot), Some(drawn)) = (&plot, drawing(design)) {
+            place = plot.draw(&result.inputs, &drawn.drawing(), printer)?;
+        }
+        printer.summary(place, &json, || summary(design, &result))?;
         accuracy_check(&result.accuracy_missed)?;
         if self.strict && !result.limits_met() {
             let unmet: Vec<String> = result

@@ -13,6 +13,7 @@ use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream, ask, can_ask};
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument, setting};
@@ -47,6 +48,10 @@ pub struct Init {
     /// Folder to write to
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: FileArgument,
+    /// Draw the array to scale, from above and cut along a row (.svg, .png or .pdf); `-` for standard
+    /// output
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
 }
@@ -71,7 +76,16 @@ impl Init {
         } else {
             self.request(Start::Seed, Object::Flat)
         };
-        let Documents { design, shape } = documents(&request).map_err(|refusal| match refusal {
+        let plot = (self.plot.as_ref())
+            .map(|file| Picture::new(file, self.writing.force, None::<PathBuf>));
+        if let Some(plot) = &plot {
+            plot.check(&[])?;
+        }
+        let Documents {
+            design,
+            shape,
+            array,
+        } = documents(&request).map_err(|refusal| match refusal {
             Refusal::Setting(message) => Failure::Usage(message),
             Refusal::Design(fault) => Failure::Documents(vec![fault]),
         })?;
@@ -89,7 +103,11 @@ impl Init {
             design: beside(&design.0),
             shape: beside(&shape.0),
         };
-        printer.summary(Stream::Output, &written, || text(&written))
+        let place = match (&plot, array) {
+            (Some(plot), Some(array)) => plot.draw(&[], &array.drawing(), printer)?,
+            _ => Stream::Output,
+        };
+        printer.summary(place, &written, || text(&written))
     }
 
     fn request(&self, start: Start, object: Object) -> Request {

@@ -12,6 +12,8 @@ use crate::design::keys::of_designs;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need};
 use crate::numerics::axis::Axis;
+use crate::plot::array::ArrayPlot;
+use crate::scene::drawing::drawing;
 use crate::shape::document;
 
 /// A design to begin with.
@@ -120,6 +122,8 @@ pub struct Documents {
     pub design: (String, String),
     /// File name and text of the shape.
     pub shape: (String, String),
+    /// The array, to draw.
+    pub array: Option<ArrayPlot>,
 }
 
 /// Why there are no documents.
@@ -170,6 +174,7 @@ pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     );
     let name = &design.name;
     Ok(Documents {
+        array: drawing(&design),
         design: (
             format!("{name}.toml"),
             commented(&head, &of_designs(), &values),

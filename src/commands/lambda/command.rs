@@ -65,8 +65,8 @@ pub struct Lambda {
     #[command(flatten)]
     uncertain: UncertaintyFlags,
     /// Draw error and currents over lambda, the errors over the surface and force against wanted
-    /// force (SVG); `-` for standard output
-    #[arg(long, value_name = "FILE")]
+    /// force (.svg, .png or .pdf); `-` for standard output
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
@@ -215,7 +215,7 @@ impl Lambda {
             }
             let place = match (&plot, &report.picture) {
                 (Some(plot), Some(picture)) => {
-                    plot.write(&report.file.inputs, &picture.svg(), printer)?
+                    plot.draw(&report.file.inputs, &picture.drawing(), printer)?
                 }
                 _ => Stream::Output,
             };

@@ -18,7 +18,7 @@ use crate::cli::args::Writing;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::pictures::Picture;
+use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
@@ -79,9 +79,9 @@ pub struct Replay {
     /// the supply's voltage
     #[arg(long)]
     dynamics: bool,
-    /// Draw finger, forces and currents over time to this SVG file
-    #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
+    /// Draw finger, forces and currents over time to this file (.svg, .png or .pdf)
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot: Option<FileArgument>,
     /// Where the table goes, with its facts and seconds beside it (replay.json,
     /// timing_replay.json); `-` is standard output, and then there is nothing beside it
     #[arg(long, value_name = "FILE", default_value = "replay.csv")]
@@ -115,6 +115,7 @@ impl Replay {
             FileArgument::Standard => None,
             FileArgument::Path(path) => Some(ReplayFiles::new(path)?),
         };
+        table_or_drawing(&self.out, self.plot.as_ref())?;
         let opened = Opened::new(&self.bundle)?;
         let (trajectory, source) = self.trajectory(&opened)?;
         let inputs: Vec<_> = std::iter::once(opened.input.clone())
@@ -131,8 +132,7 @@ impl Replay {
             let overwrite = Overwrite::same_bytes(force, &inputs).protecting(protected.iter());
             write_trajectory(&trajectory, path, &overwrite)?;
         }
-        let plot = self.plot.clone().map(FileArgument::Path);
-        let plot = plot.as_ref().map(|file| {
+        let plot = self.plot.as_ref().map(|file| {
             let written = self.trajectory_out.clone();
             Picture::new(file, force, protected.into_iter().chain(written))
         });
@@ -145,13 +145,14 @@ impl Replay {
         for warning in &report.summary.warnings {
             printer.warning(warning);
         }
-        if let Some(plot) = &plot {
-            plot.write(&inputs, &report.svg(), printer)?;
-        }
+        let drawn = match &plot {
+            Some(plot) => plot.draw(&inputs, &report.drawing(), printer)?,
+            None => Stream::Output,
+        };
         let place = match (&files, &overwrite) {
             (Some(files), Some(overwrite)) => {
                 report.write(files, overwrite)?;
-                Stream::Output
+                drawn
             }
             (None, _) | (_, None) => {
                 printer.data(|out| report.rows.write(out))?;
@@ -159,10 +160,7 @@ impl Replay {
             }
         };
         report.summary.warnings = printer.warnings();
-        let written = files.as_ref().map(|files| {
-            let beside = [&self.trajectory_out, &self.plot].into_iter().flatten();
-            written(files, beside)
-        });
+        let written = files.as_ref().map(|files| written(files, self.beside()));
         printer.summary(place, &report.summary, || {
             text::summary(&report, written.as_deref())
         })
@@ -218,8 +216,16 @@ impl Replay {
     /// Every file that is to be written.
     fn outputs(&self, files: Option<&ReplayFiles>) -> Vec<PathBuf> {
         let table = files.into_iter().flat_map(ReplayFiles::paths);
-        let beside = [&self.plot, &self.trajectory_out].into_iter().flatten();
-        table.chain(beside.cloned()).collect()
+        table.chain(self.beside().cloned()).collect()
+    }
+
+    /// The files beside the table's own.
+    fn beside(&self) -> impl Iterator<Item = &PathBuf> {
+        let plot = self.plot.as_ref().and_then(|file| match file {
+            FileArgument::Path(path) => Some(path),
+            FileArgument::Standard => None,
+        });
+        self.trajectory_out.iter().chain(plot)
     }
 
     /// The requested synthesis, and its name for people.

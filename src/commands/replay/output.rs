@@ -12,6 +12,7 @@ use crate::bundle::replay::Answer;
 use crate::bundle::seal::to_record;
 use crate::bundle::timing::{ReplayTiming, StageSeconds};
 use crate::bundle::trajectory::Trajectory;
+use crate::plot::drawing::Drawing;
 use crate::plot::replay::ReplayPlot;
 
 /// Names of the files that go with a table.
@@ -118,8 +119,8 @@ impl ReplayReport {
 
     /// The picture.
     #[must_use]
-    pub fn svg(&self) -> String {
-        self.plot().svg()
+    pub fn drawing(&self) -> Drawing {
+        self.plot().drawing()
     }
 
     fn plot(&self) -> ReplayPlot<'_> {

@@ -200,7 +200,9 @@ pub fn merge(
     let (fronts, among_met) = fronts(&gathered.briefs);
     let plot = plot(plan, &gathered.briefs, &fronts, among_met);
     let plot_name = name(".svg");
-    let written = set.write(&plot_name, |out| out.write_all(plot.svg().as_bytes()))?;
+    let written = set.write(&plot_name, |out| {
+        out.write_all(plot.drawing().svg().as_bytes())
+    })?;
     listed.push(FileEntry::new(plot_name, written));
     let best = rows_on(&gathered.briefs, &fronts);
     let front_name = name("_pareto.csv");

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 
-use super::renumbered;
+use super::drawing::Drawing;
 use super::replay::COILS as COLOURS;
 
 /// The plane's size, px.
@@ -51,7 +50,7 @@ pub struct CurvesPlot {
 impl CurvesPlot {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let shown: Vec<Line> = self.lines.iter().map(Line::drawable).collect();
         let all = || shown.iter().flat_map(|line| line.points.iter());
         let x = decades(all().map(|p| p.0));
@@ -88,7 +87,7 @@ impl CurvesPlot {
             .with_layouts(vec![layout])
             .with_shared_legend_bottom()
             .with_shared_legend_entries(self.legend());
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        Drawing::new(figure.render())
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
@@ -171,7 +170,7 @@ mod tests {
     #[test]
     fn labels_are_there_and_bytes_are_the_same_twice() {
         let plot = drawing(&[(1e-3, 1e-2), (2e-3, 1e-4), (7e-3, 1e-9)]);
-        let svg = plot.svg();
+        let svg = plot.drawing().svg();
         for label in [
             "processor time / s",
             "relative to |grad B|",
@@ -180,7 +179,7 @@ mod tests {
         ] {
             assert!(svg.contains(label), "{label}");
         }
-        assert!(svg == plot.svg());
+        assert!(svg == plot.drawing().svg());
     }
 
     #[test]
@@ -191,7 +190,7 @@ mod tests {
             &[(f64::NAN, 1.0), (1.0, f64::INFINITY), (-1.0, 1.0)],
             &[(1.0, 1.0)],
         ] {
-            let svg = drawing(points).svg();
+            let svg = drawing(points).drawing().svg();
             assert!(
                 svg.ends_with("</svg>") && !svg.contains("NaN"),
                 "{points:?}"

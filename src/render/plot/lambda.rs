@@ -1,16 +1,16 @@
 //! The force constant of one object: its error and currents over lambda, and what is felt where.
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::annotations::ReferenceLine;
 use kuva::plot::{Heatmap, LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
+use super::drawing::Drawing;
 use super::pareto::extent;
 use super::plane::{Cells, colours, rows, wide};
 use super::replay::COILS;
-use super::{entry, renumbered, thinned};
+use super::{entry, thinned};
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [600.0, 400.0];
@@ -100,7 +100,7 @@ pub struct LambdaPlot {
 impl LambdaPlot {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let (errors, relative, over_lambda) = self.errors();
         let panels = [self.currents(), self.map(), self.forces()];
         let (others, layouts): (Vec<_>, Vec<_>) = panels.into_iter().unzip();
@@ -114,7 +114,7 @@ impl LambdaPlot {
             .with_layouts(layouts)
             .with_shared_legend()
             .with_shared_legend_entries(self.legend());
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        Drawing::new(figure.render())
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
@@ -378,7 +378,7 @@ mod tests {
 
     #[test]
     fn panels_say_what_they_show_and_are_the_same_twice() {
-        let svg = drawing(49).svg();
+        let svg = drawing(49).drawing().svg();
         for words in [
             "chosen 1.9000 N/m",
             "linear 1.3000 N/m",
@@ -390,23 +390,30 @@ mod tests {
             assert!(svg.contains(words), "{words}");
         }
         assert!(!svg.contains("with feedback") && !svg.contains("NaN"));
-        assert!(svg == drawing(49).svg(), "not the same bytes twice");
+        assert!(
+            svg == drawing(49).drawing().svg(),
+            "not the same bytes twice"
+        );
     }
 
     #[test]
     fn one_point_and_none_are_drawn() {
         for points in [0, 1] {
             let mut drawn = drawing(points);
-            assert!(drawn.svg().ends_with("</svg>") && !drawn.svg().contains("NaN"));
+            assert!(
+                drawn.drawing().svg().ends_with("</svg>") && !drawn.drawing().svg().contains("NaN")
+            );
             if let Some(chosen) = &mut drawn.chosen {
                 chosen.map = ErrorMap::Scattered {
                     points_mm: vec![(0.7, 1.3); points],
                     errors_mn: vec![-0.3; points],
                 };
             }
-            assert!(!drawn.svg().contains("NaN") && !drawn.svg().contains("inf"));
+            assert!(
+                !drawn.drawing().svg().contains("NaN") && !drawn.drawing().svg().contains("inf")
+            );
             drawn.chosen = None;
-            assert!(drawn.svg().contains("no lambda is chosen"));
+            assert!(drawn.drawing().svg().contains("no lambda is chosen"));
         }
     }
 }

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::{ColorMap, Heatmap};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
+use kuva::render::render::Primitive;
 
-use super::renumbered;
+use super::drawing::Drawing;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [460.0, 400.0];
@@ -45,7 +45,7 @@ pub struct MatrixPlot {
 impl MatrixPlot {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let (plots, layouts) = self.panels.iter().map(|panel| self.panel(panel)).unzip();
         let columns = self.columns.max(1);
         let rows = self.panels.len().div_ceil(columns).max(1);
@@ -54,9 +54,16 @@ impl MatrixPlot {
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(plots)
             .with_layouts(layouts);
-        let svg = renumbered(&SvgBackend::default().render_scene(&figure.render()));
-        // A square without a value has no number.
-        svg.replace(">NaN<", ">-<")
+        let mut scene = figure.render();
+        for element in &mut scene.elements {
+            // A square without a value has no number.
+            if let Primitive::Text { content, .. } = element
+                && content == "NaN"
+            {
+                "-".clone_into(content);
+            }
+        }
+        Drawing::new(scene)
     }
 
     fn panel(&self, panel: &Panel) -> (Vec<Plot>, Layout) {
@@ -114,11 +121,11 @@ mod tests {
                 values: vec![Some(0.0), Some(1.732), Some(1.732), None],
             }],
         };
-        let svg = drawing.svg();
+        let svg = drawing.drawing().svg();
         for text in ["dome", "wedge", "1.73", "largest", "apart"] {
             assert!(svg.contains(text), "{text}");
         }
-        assert!(svg == drawing.svg());
+        assert!(svg == drawing.drawing().svg());
         assert!(!svg.contains("NaN"));
     }
 }

@@ -1,8 +1,10 @@
-//! Drawings, from plain numbers to SVG text: the only room that knows the plotting crate.
+//! Drawings from plain numbers, as SVG, PNG or PDF: the only room that knows the plotting crate.
 //!
 //! The same numbers give the same bytes.
 
+pub mod array;
 pub mod curves;
+pub mod drawing;
 pub mod lambda;
 pub mod matrix;
 pub mod pareto;
@@ -25,25 +27,6 @@ fn entry(label: &str, colour: &str, shape: LegendShape) -> LegendEntry {
         shape,
         dasharray: None,
     }
-}
-
-/// The drawing with its clip paths counted from 0: the crate counts on through a process.
-fn renumbered(svg: &str) -> String {
-    const NAME: &str = "kuva-clip-";
-    let mut parts = svg.split(NAME);
-    let mut text = parts.next().unwrap_or("").to_owned();
-    let mut seen: Vec<&str> = Vec::new();
-    for part in parts {
-        let digits = part.bytes().take_while(u8::is_ascii_digit).count();
-        let (number, rest) = part.split_at(digits);
-        let at = seen.iter().position(|one| *one == number);
-        let at = at.unwrap_or_else(|| {
-            seen.push(number);
-            seen.len() - 1
-        });
-        text.push_str(&format!("{NAME}{at}{rest}"));
-    }
-    text
 }
 
 /// The first point in each cell.

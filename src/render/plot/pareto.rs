@@ -1,12 +1,12 @@
 //! Gain against three costs, one panel each, with the front that no other point beats.
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::{renumbered, thinned};
+use super::drawing::Drawing;
+use super::thinned;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [400.0, 380.0];
@@ -75,7 +75,7 @@ impl DrawnPanel {
 impl ParetoPlot {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let (cells, layouts): (Vec<_>, Vec<_>) = self.drawn().iter().map(panel).unzip();
         let figure = Figure::new(1, 3)
             .with_title(self.title.clone())
@@ -84,7 +84,7 @@ impl ParetoPlot {
             .with_layouts(layouts)
             .with_shared_legend_bottom()
             .with_shared_legend_entries(self.legend());
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        Drawing::new(figure.render())
     }
 
     /// Values of the panels, in units that suit them; of points that would lie on each other
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn axes_carry_units_that_suit_their_values() {
-        let svg = drawing(30).svg();
+        let svg = drawing(30).drawing().svg();
         for label in [
             "force / mN",
             "resistance / ohm",
@@ -221,13 +221,16 @@ mod tests {
         ] {
             assert!(svg.contains(label), "{label}");
         }
-        assert!(svg == drawing(30).svg(), "not the same bytes twice");
+        assert!(
+            svg == drawing(30).drawing().svg(),
+            "not the same bytes twice"
+        );
     }
 
     #[test]
     fn few_points_and_many_are_drawn() {
         for count in [0, 1, 2] {
-            let svg = drawing(count).svg();
+            let svg = drawing(count).drawing().svg();
             assert!(
                 svg.ends_with("</svg>") && !svg.contains("NaN"),
                 "{count}: {svg}"
@@ -235,9 +238,9 @@ mod tests {
         }
         let mut same = drawing(7);
         same.gains = vec![0.7; 7];
-        assert!(!same.svg().contains("NaN"));
+        assert!(!same.drawing().svg().contains("NaN"));
         let circles = |svg: &str| svg.matches("<circle").count();
-        let many = circles(&drawing(200_000).svg());
+        let many = circles(&drawing(200_000).drawing().svg());
         assert!(many < 20_000, "{many}");
     }
 }

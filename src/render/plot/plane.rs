@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::{ColorMap, Heatmap, LegendEntry, LegendShape, QuiverPlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::{renumbered, thinned};
+use super::drawing::Drawing;
+use super::thinned;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [460.0, 400.0];
@@ -95,7 +95,7 @@ pub struct PlanePlot {
 impl PlanePlot {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let (plots, layouts) = self.panels.iter().map(|panel| self.panel(panel)).unzip();
         let figure = Figure::new(1, self.panels.len().max(1))
             .with_title(self.title.clone())
@@ -110,7 +110,7 @@ impl PlanePlot {
                 .with_shared_legend_bottom()
                 .with_shared_legend_entries(legend)
         };
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        Drawing::new(figure.render())
     }
 
     fn panel(&self, panel: &Panel) -> (Vec<Plot>, Layout) {
@@ -268,12 +268,12 @@ mod tests {
 
     #[test]
     fn a_drawing_says_what_it_shows_and_is_the_same_twice() {
-        let svg = drawing(9, 7).svg();
+        let svg = drawing(9, 7).drawing().svg();
         for text in ["heights / mm", "x / mm", "rim (1)", "push"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("NaN"));
-        assert!(svg == drawing(9, 7).svg());
+        assert!(svg == drawing(9, 7).drawing().svg());
     }
 
     #[test]
@@ -284,6 +284,6 @@ mod tests {
         let rows = rows(&cells);
         assert_eq!((rows.len(), rows[0].len()), (3, 91));
         assert!(rows.iter().flatten().any(|value| *value == -77.0));
-        assert!(drawing(0, 0).svg().ends_with("</svg>"));
+        assert!(drawing(0, 0).drawing().svg().ends_with("</svg>"));
     }
 }

@@ -1,13 +1,13 @@
 //! A replay over time: where the finger is, the forces with and without feedback, the currents.
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::annotations::ShadedRegion;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::{entry, renumbered};
+use super::drawing::Drawing;
+use super::entry;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [620.0, 330.0];
@@ -57,7 +57,7 @@ pub struct ReplayPlot<'a> {
 impl ReplayPlot<'_> {
     /// The drawing.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub fn drawing(&self) -> Drawing {
         let panels = [self.plan(), self.heights(), self.forces(), self.currents()];
         let (cells, layouts): (Vec<_>, Vec<_>) = panels.into_iter().unzip();
         let figure = Figure::new(2, 2)
@@ -67,7 +67,7 @@ impl ReplayPlot<'_> {
             .with_layouts(layouts)
             .with_shared_legend()
             .with_shared_legend_entries(self.legend());
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        Drawing::new(figure.render())
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
@@ -259,7 +259,7 @@ mod tests {
             coils: 2,
             current_a: &vec![0.7; 2 * count],
         };
-        plot.svg()
+        plot.drawing().svg()
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
 use super::{directions, error_budget, field, limits, path, surface, uncertainty};
+use crate::plot::array::{ArrayPlot, View};
 
 /// The page.
 #[must_use]
@@ -25,6 +26,7 @@ pub fn page(object: &CalibratedObject, files: &[&str]) -> String {
         Some(error_budget::section(object)),
         Some(limits::section(object)),
         Some(path::section(object, &mut data)),
+        object.array.as_ref().map(array),
         Some(field::section(object, &mut data)),
         object
             .error_time
@@ -135,6 +137,36 @@ fn answer(object: &CalibratedObject) -> Section {
     Section {
         id: "answer",
         title: "Result",
+        body,
+    }
+}
+
+/// The array from above and in section, where scripts are off too.
+fn array(plot: &ArrayPlot) -> Section {
+    let mut body = Html::default();
+    body.raw("<p class=\"key\">");
+    for (name, class) in plot.legend() {
+        body.raw(&format!("<svg class=\"array swatch\" viewBox=\"0 0 14 10\"><rect class=\"{class}\" width=\"14\" height=\"10\"/></svg>"))
+            .text(name)
+            .raw(" ");
+    }
+    body.raw("</p><div class=\"pair\">");
+    for (view, caption) in [
+        (View::Plan, "The array from above; numbers are the coils'."),
+        (
+            View::Section,
+            "Cut along the row next to the middle, the magnet at the target height.",
+        ),
+    ] {
+        body.raw("<figure>")
+            .raw(&plot.markup(view))
+            .element("figcaption", caption)
+            .raw("</figure>");
+    }
+    body.raw("</div>");
+    Section {
+        id: "array",
+        title: "Array",
         body,
     }
 }

@@ -29,7 +29,10 @@ pub fn files(
     others: &[&str],
 ) -> io::Result<Vec<(&'static str, Vec<u8>)>> {
     let mut files = vec![
-        ("plots/lambda.svg", object.curves.svg().into_bytes()),
+        (
+            "plots/lambda.svg",
+            object.curves.drawing().svg().into_bytes(),
+        ),
         ("plots/lambda.csv", lambda_table(object.curves)?),
     ];
     if let Some(table) = errors_table(object)? {
@@ -39,12 +42,12 @@ pub fn files(
     files.push(("plots/field.svg", svg.into_bytes()));
     files.push(("plots/field.csv", table));
     if let Some(field) = &object.directions {
-        let drawing = directions::plot(object, field).svg();
+        let drawing = directions::plot(object, field).drawing().svg();
         files.push(("plots/direction.svg", drawing.into_bytes()));
         files.push(("plots/direction.csv", directions::table(field)?));
     }
     if let Some(study) = &object.lambda.uncertainty {
-        let drawing = uncertainty::plot(object, study).svg();
+        let drawing = uncertainty::plot(object, study).drawing().svg();
         files.push(("plots/uncertainty.svg", drawing.into_bytes()));
         files.push(("plots/uncertainty.csv", uncertainty::table(study)?));
     }
@@ -142,5 +145,5 @@ fn field_plot(object: &CalibratedObject) -> io::Result<(String, Vec<u8>)> {
             ("dbz_dz_t_per_m", Column::Number(&values)),
         ],
     )?;
-    Ok((plot.svg(), out))
+    Ok((plot.drawing().svg(), out))
 }

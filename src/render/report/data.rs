@@ -9,6 +9,7 @@ use fluxform_bundle::npz::MapArrays;
 use fluxform_bundle::table::PointRow;
 use fluxform_coil::limits::LimitCheck;
 
+use crate::plot::array::ArrayPlot;
 use crate::plot::lambda::LambdaPlot;
 
 use super::measured::MeasuredCurve;
@@ -28,6 +29,8 @@ pub struct CalibratedObject<'a> {
     pub curves: &'a LambdaPlot,
     /// Where the forces point; `None` where the upward one alone is requested.
     pub directions: Option<DirectionField>,
+    /// The array, to scale.
+    pub array: Option<ArrayPlot>,
     /// A coil in plan.
     pub section: CoilPlan,
     /// The design's limits on one coil.

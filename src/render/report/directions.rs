@@ -168,7 +168,7 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
         ),
     );
     body.raw("<figure>")
-        .raw(&plot(object, field).svg())
+        .raw(&plot(object, field).drawing().svg())
         .raw("</figure>");
     Some(Section {
         id: "directions",

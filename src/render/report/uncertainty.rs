@@ -113,7 +113,7 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
     );
     body.element("p", &text);
     body.raw("<figure>")
-        .raw(&plot(object, study).svg())
+        .raw(&plot(object, study).drawing().svg())
         .raw("</figure>");
     let row = |(name, error): &(&str, &CurrentsError)| -> Vec<Cell> {
         let (promised, realised) = (&error.promised, &error.realised);

@@ -62,5 +62,5 @@ pub fn svg(result: &ArrayOptimization) -> Option<String> {
         front: "computed arrays that no other one beats",
         panels: std::array::from_fn(panel),
     };
-    Some(plot.svg())
+    Some(plot.drawing().svg())
 }

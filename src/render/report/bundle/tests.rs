@@ -181,6 +181,7 @@ impl Parts {
             points: &self.points,
             map: &self.map,
             curves: &self.curves,
+            array: None,
             section: CoilPlan {
                 inner_radius_m: 0.012,
                 outer_radius_m: 0.019,

@@ -1,0 +1,81 @@
+//! A finished drawing, written as the ending of its file asks.
+
+use kuva::backend::pdf::PdfBackend;
+use kuva::backend::png::PngBackend;
+use kuva::backend::svg::SvgBackend;
+use kuva::render::render::Scene;
+
+/// Pixels of a PNG along a pixel of the drawing: sharp on screens of today and in print.
+const PNG_SCALE: f32 = 2.0;
+
+/// How a drawing is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrawingFormat {
+    /// Text, the same bytes for the same numbers.
+    Svg,
+    /// Pixels.
+    Png,
+    /// One page of the drawing's size.
+    Pdf,
+}
+
+impl DrawingFormat {
+    /// All of them, each named by its ending.
+    pub const ALL: [(&str, Self); 3] = [("svg", Self::Svg), ("png", Self::Png), ("pdf", Self::Pdf)];
+
+    /// The one that an ending names, in any case.
+    #[must_use]
+    pub fn of(ending: &str) -> Option<Self> {
+        let named = |(name, _): &&(&str, Self)| name.eq_ignore_ascii_case(ending);
+        Self::ALL.iter().find(named).map(|(_, format)| *format)
+    }
+}
+
+/// A drawing, its sizes in pixels.
+#[derive(Debug)]
+pub struct Drawing(Scene);
+
+impl Drawing {
+    pub(super) fn new(scene: Scene) -> Self {
+        Self(scene)
+    }
+
+    /// As SVG.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        renumbered(&SvgBackend::default().render_scene(&self.0))
+    }
+
+    /// In `format`.
+    ///
+    /// # Errors
+    /// A drawing that is too large for it.
+    pub fn bytes(&self, format: DrawingFormat) -> Result<Vec<u8>, String> {
+        match format {
+            DrawingFormat::Svg => Ok(self.svg().into_bytes()),
+            DrawingFormat::Png => PngBackend::new()
+                .with_scale(PNG_SCALE)
+                .render_scene(&self.0),
+            DrawingFormat::Pdf => PdfBackend::new().render_scene(&self.0),
+        }
+    }
+}
+
+/// The drawing with its clip paths counted from 0: the crate counts on through a process.
+fn renumbered(svg: &str) -> String {
+    const NAME: &str = "kuva-clip-";
+    let mut parts = svg.split(NAME);
+    let mut text = parts.next().unwrap_or("").to_owned();
+    let mut seen: Vec<&str> = Vec::new();
+    for part in parts {
+        let digits = part.bytes().take_while(u8::is_ascii_digit).count();
+        let (number, rest) = part.split_at(digits);
+        let at = seen.iter().position(|one| *one == number);
+        let at = at.unwrap_or_else(|| {
+            seen.push(number);
+            seen.len() - 1
+        });
+        text.push_str(&format!("{NAME}{at}{rest}"));
+    }
+    text
+}
