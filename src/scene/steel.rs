@@ -302,6 +302,13 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         Some((_, secant)) => *secant,
         None => core.relative_permeability(),
     };
+    let solved = |steel, steel_error| Solved {
+        steel,
+        tolerance,
+        steel_error,
+        relative_permeability,
+        prepared: PreparedField::default(),
+    };
     if coupled(scene.design) {
         let radii = core.shape.length_m() / core.shape.radius_m;
         if radii > MOST_SLENDER {
@@ -319,13 +326,8 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
             STEEL_SHARE * tolerance,
             lowest_m,
         )?;
-        return Ok(Solved {
-            tolerance,
-            steel_error: array.relative_error,
-            steel: Steel::Coupled(Box::new(array)),
-            relative_permeability,
-            prepared: PreparedField::default(),
-        });
+        let steel_error = array.relative_error;
+        return Ok(solved(Steel::Coupled(Box::new(array)), steel_error));
     }
     let (alone, steel_error) = match at_current {
         Some((state, _)) => (
@@ -354,13 +356,7 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
             )
         }
     };
-    Ok(Solved {
-        tolerance,
-        steel_error,
-        steel: Steel::Alone(Box::new(alone)),
-        relative_permeability,
-        prepared: PreparedField::default(),
-    })
+    Ok(solved(Steel::Alone(Box::new(alone)), steel_error))
 }
 
 fn solve_iron(

@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::file_mesh::Triangle;
 use crate::height::{Grid, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
@@ -98,23 +99,7 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let normal = normal(facet);
         let level = LEVEL * dot(normal, normal).sqrt();
         let p = [point[0], point[1]];
-        // What ends below the point, or lies beside it, does not cover it; its own facet is met in any
-        // case.
-        let seen_m = point[2] + depth_m;
-        let rises = |at: &u32| {
-            let [a, b, c] = &triangles[*at as usize];
-            let beside = |k: usize| {
-                let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-                p[k] < low - 2.0 * rules.reach_m || p[k] > high + 2.0 * rules.reach_m
-            };
-            let covers = a[2].max(b[2]).max(c[2]) > seen_m && !beside(0) && !beside(1);
-            covers || *at as usize == facet
-        };
-        let above: Vec<u32> = index.at(p).iter().copied().filter(rises).collect();
-        let others = above.iter().any(|at| *at as usize != facet);
-        let covered = others
-            && point_flags::at(triangles, &above, p, rules)
-                .is_some_and(|(top, _)| top.height_m > seen_m);
+        let covered = is_covered(triangles, index.at(p), (facet, point), depth_m, rules);
         // A wall, seen edge-on, hides nothing by itself.
         if normal[2].abs() <= level {
             return [1, 0, 0, 0];
@@ -140,11 +125,44 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
     }
 }
 
+/// Whether anything lies more than `depth_m` above a `point` on a `facet`.
+fn is_covered(
+    triangles: &[Triangle],
+    touching: &[u32],
+    (facet, point): (usize, [f64; 3]),
+    depth_m: f64,
+    rules: Rules,
+) -> bool {
+    let (p, seen_m) = ([point[0], point[1]], point[2] + depth_m);
+    // What does not reach over the point does not cover it; its own facet is met in any case.
+    let rises = |at: &u32| {
+        let at = *at as usize;
+        at == facet || may_cover(&triangles[at], p, seen_m, 2.0 * rules.reach_m)
+    };
+    let above: Vec<u32> = touching.iter().copied().filter(rises).collect();
+    above.iter().any(|at| *at as usize != facet)
+        && point_flags::at(triangles, &above, p, rules)
+            .is_some_and(|(top, _)| top.height_m > seen_m)
+}
+
+/// Whether any of `triangle` lies above `height_m` and within `reach_m` of the line through `p`.
+fn may_cover(triangle: &Triangle, p: [f64; 2], height_m: f64, reach_m: f64) -> bool {
+    let range = |k: usize| {
+        let [a, b, c] = triangle.map(|corner| corner[k]);
+        (a.min(b).min(c), a.max(b).max(c))
+    };
+    let meets = |k: usize| {
+        let (low, high) = range(k);
+        p[k] >= low - reach_m && p[k] <= high + reach_m
+    };
+    range(2).1 > height_m && meets(0) && meets(1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::document::Placement;
-    use crate::file_mesh::{FileMesh, Triangle};
+    use crate::file_mesh::FileMesh;
     use crate::placement::Transform;
 
     /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.

@@ -199,6 +199,10 @@ impl<'a> Images<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::steel::CoreShape;
+    use crate::steel::array::CoupledArray;
+    use crate::steel::equivalent_dipoles::ArraySources;
+    use crate::winding::Winding;
 
     #[test]
     fn a_square_has_eight_a_rectangle_four_a_scatter_one() {
@@ -231,6 +235,74 @@ mod tests {
             let k = motion.angle(0, 12) as f64;
             let difference = (direction - k * std::f64::consts::TAU / 12.0).sin();
             assert!(difference.abs() < 1e-12, "{motion:?}");
+        }
+    }
+
+    /// A square array's grid of points once cost eight times the points of its sector.
+    #[test]
+    fn places_of_one_sector_stand_for_all_of_a_symmetric_array() {
+        let winding = Winding {
+            inner_radius_m: 0.013,
+            outer_radius_m: 0.019,
+            length_m: 0.07,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.011,
+            bottom_m: -0.083,
+            top_m: 0.003,
+        };
+        let grid = |pitch: [f64; 2]| -> Vec<[f64; 2]> {
+            let at = |i: u32| {
+                [
+                    0.013 + pitch[0] * f64::from(i % 2),
+                    -0.007 + pitch[1] * f64::from(i / 2),
+                ]
+            };
+            (0..4).map(at).collect()
+        };
+        let (lowest_m, tolerance) = (0.023, 1e-4);
+        for (pitch, sectors) in [([0.047, 0.047], 8), ([0.047, 0.053], 4)] {
+            let positions_m = grid(pitch);
+            let array =
+                CoupledArray::new(&winding, shape, 470.0, &positions_m, 1e-3, lowest_m).unwrap();
+            let sources =
+                ArraySources::for_many_points(&array, lowest_m, lowest_m - shape.top_m, tolerance);
+            let points: Vec<[f64; 3]> = (0..200)
+                .map(|k| {
+                    let part = |step: f64| (0.5 + step * f64::from(k)).fract();
+                    let (x, y) = (part(0.754_877_666), part(0.569_840_291));
+                    [
+                        0.14 * x - 0.04,
+                        0.13 * y - 0.05,
+                        lowest_m * f64::from(1 + k % 3),
+                    ]
+                })
+                .collect();
+            for parts in Components::ALL {
+                let mut values = vec![0.0; positions_m.len() * parts.count() * points.len()];
+                let mut sure = values.clone();
+                sources.sample(&points, *parts, &mut values);
+                sources.sample_all(&points, *parts, &mut sure);
+                // Fields are a few times the gradient over the metre.
+                let size = winding.field(0.0, lowest_m).unwrap().gradient_norm();
+                let worst = values
+                    .iter()
+                    .zip(&sure)
+                    .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                assert!(worst < tolerance * size, "{parts:?}: {:e}", worst / size);
+            }
+            let symmetries = motions(&positions_m);
+            assert_eq!(symmetries.len(), sectors);
+            let centre_m = [0.013 + 0.5 * pitch[0], -0.007 + 0.5 * pitch[1]];
+            let nodes: Vec<[f64; 3]> = (0..41 * 41)
+                .map(|i| {
+                    let step = |k: i32| 0.002 * f64::from(k - 20);
+                    [centre_m[0] + step(i % 41), centre_m[1] + step(i / 41), 0.03]
+                })
+                .collect();
+            let different = Images::new(&symmetries, centre_m, &nodes).sector_m.len();
+            assert_eq!(different, if sectors == 8 { 231 } else { 441 });
         }
     }
 }
