@@ -115,6 +115,8 @@ impl SearchSpace {
 const COUNT: Rule = Rule::any("").bound(Bound::AtLeast(1.0));
 
 /// Reads the section.
+///
+/// Long because every key is declared where it is read, on a line of its own.
 pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
     let mut space = SearchSpace::default();
     let body = BODY_MM.positive();

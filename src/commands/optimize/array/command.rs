@@ -80,6 +80,8 @@ pub struct Shared<'a> {
 impl ArrayFlags {
     /// Runs the search.
     ///
+    /// Long because every file that will be written is checked before the search, in its order.
+    ///
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, shared: &Shared<'_>, printer: &Printer) -> Result<(), Failure> {

@@ -128,6 +128,9 @@ fn before(
     })
 }
 
+/// What was found, as it is reported.
+///
+/// Long because it is one literal of the result's fields.
 fn result(
     document: &Document<'_>,
     (shapes, inputs): (&[ShapeSource], Vec<Input>),
