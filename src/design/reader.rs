@@ -196,11 +196,14 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The tables `[[name]]` of this one.
+    /// The tables `[[name]]` of this one; a single `[name]` is one of them.
     pub fn sections(&mut self, name: &'static str) -> Vec<Section<'a>> {
         let Some(found) = self.found(name) else {
             return Vec::new();
         };
+        if matches!(found.get_ref(), DeValue::Table(_)) {
+            return vec![self.section(name)];
+        }
         let DeValue::Array(tables) = found.get_ref() else {
             self.add_wrong_type(&self.path_of(name), found, &format!("sections [[{name}]]"));
             return Vec::new();
