@@ -15,8 +15,9 @@ pub const MAP_TOLERANCE: f64 = 1e-9;
 pub const CORED_TOLERANCE: f64 = 1e-6;
 /// One core along its B-H curve, whose kinks cross the elements, so that digits are dear.
 pub const SATURATED_TOLERANCE: f64 = 1e-4;
-/// The flux density inside a core: a steel's knee is not known as well.
-pub const CORE_FIELD_TOLERANCE: f64 = 1e-3;
+/// The flux density inside a core: a steel's knee is not known as well. Along a B-H curve, whose kinks
+/// cross the elements, it is at no request held to less.
+pub const CORE_FIELD_TOLERANCE: f64 = 1e-2;
 /// The cores of an array that magnetise each other.
 pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// Steel of any shape: a plate under nine cores takes half a minute of one processor.
@@ -125,7 +126,10 @@ impl Tolerances {
         let or = |default: f64| requested.unwrap_or(default);
         Self {
             coil: or(of_core(KERNEL_ERROR)),
-            core_field: or(CORE_FIELD_TOLERANCE),
+            core_field: match core.map(|core| &core.material) {
+                Some(Material::Curve(_)) => or(CORE_FIELD_TOLERANCE).max(CORE_FIELD_TOLERANCE),
+                Some(Material::Linear(_)) | None => or(CORE_FIELD_TOLERANCE),
+            },
             field: or(of_array(KERNEL_ERROR)),
             forces: or(of_array(forces_in_air)),
             map: or(of_array(MAP_TOLERANCE)),

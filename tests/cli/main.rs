@@ -24,6 +24,7 @@ mod streams;
 mod surfaces;
 mod sweep;
 mod uncertainty;
+mod vector;
 mod verify;
 mod weights;
 

@@ -1,0 +1,121 @@
+//! The force as a vector on the command line: static currents, two fingers, comparisons.
+
+use fluxform_testing::place::Place;
+use serde_json::Value;
+
+use crate::SEED;
+
+fn wedge(place: &Place, more: &str) -> &'static str {
+    let text = format!(
+        "name = \"wedge\"\nprimitive = \"wedge\"\nforce = \"vertical-only\"\n{more}[points]\n\
+         x_mm = [-50.0, 50.0, 9]\ny_mm = [-50.0, 50.0, 9]\n"
+    );
+    place.write("small_wedge.toml", &text);
+    "small_wedge.toml"
+}
+
+fn number(of: &Value, path: &str) -> f64 {
+    of.pointer(path)
+        .and_then(Value::as_f64)
+        .unwrap_or_else(|| panic!("{path} in {of}"))
+}
+
+/// Static currents were chosen for the upward component, whatever was requested.
+#[test]
+fn static_currents_for_a_vector_trade_what_is_noticed() {
+    let place = Place::new();
+    let solved = |more: &str, flags: &[&str]| {
+        let command = [
+            "lambda",
+            SEED,
+            wedge(&place, more),
+            "--feedback",
+            "--format",
+            "json",
+        ];
+        let report = place.run(&[&command[..], flags].concat()).ends(0).json();
+        report["feedback"]["vector"].clone()
+    };
+    let usual = solved("", &[]);
+    let weight = number(&usual, "/static_vector/sideways_weight");
+    assert!((weight - 0.07 / 25.0_f64.to_radians().tan()).abs() < 1e-12);
+    let of_upward = number(&usual, "/static/sideways_share");
+    let sideways = |of: &Value| number(of, "/static_vector/at_chosen/rendering/sideways_share");
+    let keener = solved("direction_jnd_deg = 5.0\n", &[]);
+    assert!(
+        sideways(&keener) < sideways(&usual) && sideways(&usual) < of_upward,
+        "{keener}"
+    );
+    assert_eq!(
+        keener["static_vector"],
+        solved("", &["--direction-jnd", "5deg"])["static_vector"]
+    );
+    let worst = "/static_vector/at_chosen/worst";
+    let low = number(&usual, &format!("{worst}/at_least_n"));
+    let high = number(&usual, &format!("{worst}/worst_error_n"));
+    assert!(low > 0.0 && low <= high && high < 1.1 * low, "{low} {high}");
+}
+
+#[test]
+fn two_fingers_are_somewhere_else_and_get_their_share() {
+    let place = Place::new();
+    place.write(
+        "two_way.toml",
+        &place.text(SEED).replace(
+            "current_max_a = 2.0",
+            "current_max_a = 2.0\ncurrent_min_a = -2.0",
+        ),
+    );
+    let run = |design: &str, apart: &str| {
+        place.run(&[
+            "lambda",
+            design,
+            wedge(&place, ""),
+            "--feedback",
+            "--two-fingers",
+            apart,
+            "--format",
+            "json",
+        ])
+    };
+    let report = run("two_way.toml", "50mm,80mm").ends(0).json();
+    let of = &report["feedback"]["two_fingers"];
+    let share = |what: &str| number(of, what);
+    assert_eq!(share("/pairs"), 1000.0);
+    assert!(
+        share("/upward_share") >= share("/vector_share") && share("/upward_share") > 0.5,
+        "{of}"
+    );
+    // 3 mu_0 m^2 / (4 pi r^4) and twice that, for 0.91 A m^2 at 50 mm and more.
+    assert!((0.001..0.08).contains(&share("/magnets_force_n")), "{of}");
+    run("two_way.toml", "0,50mm")
+        .ends(2)
+        .says(&["cannot be in the same place"]);
+    let none = run("two_way.toml", "30cm,40cm").ends(0).json();
+    assert_eq!(none["feedback"]["two_fingers"]["pairs"], 0);
+}
+
+#[test]
+fn compared_forces_are_vectors() {
+    let place = Place::new();
+    let shape = wedge(&place, "");
+    let report = place
+        .run(&[
+            "compare",
+            SEED,
+            shape,
+            "shapes/flat.toml",
+            "--format",
+            "json",
+        ])
+        .ends(0)
+        .json();
+    let pair = &report["pairs"][0];
+    for kind in ["static", "feedback"] {
+        assert!(number(pair, &format!("/{kind}_vector_jnd")) > 0.0);
+        assert!(number(pair, &format!("/{kind}_vector_rms_jnd")) > 0.0);
+        let upward = number(pair, &format!("/{kind}_at/a_force_n"));
+        assert_eq!(number(pair, &format!("/{kind}_at/a_vector_n/2")), upward);
+    }
+    assert!(number(pair, "/static_at/a_vector_n/0").abs() > 0.0);
+}
