@@ -1,0 +1,179 @@
+use super::*;
+
+/// A kernel is singular a gap away from a panel of one and a half gaps: half-axes 4/3 and 5/3
+/// of its Bernstein ellipse in units of half the panel, hence an error of 3^(-2 n).
+#[test]
+fn exchange_panels_resolve_the_gap_between_cores() {
+    let shape = CoreShape {
+        radius_m: 0.007,
+        bottom_m: -0.05,
+        top_m: 0.0,
+    };
+    for digits in 1..=9 {
+        let tolerance = 10_f64.powi(-digits);
+        let resolution = ArrayResolution::for_tolerance(tolerance, shape, 0.02);
+        assert!((resolution.panel_m - 1.5 * (0.02 - 0.014)).abs() < 1e-12);
+        let error = 3_f64.powi(-2 * i32::try_from(resolution.order).unwrap());
+        assert!(error < 0.1 * tolerance, "{tolerance:e}: {error:e}");
+    }
+}
+
+/// Lattices, whole and with holes, and scattered cores: solved by what passes between them they are
+/// what whole grids give.
+#[test]
+fn what_passes_between_cores_gives_what_whole_grids_give() {
+    let winding = Winding {
+        inner_radius_m: 0.013,
+        outer_radius_m: 0.019,
+        length_m: 0.07,
+        turns: 700.0,
+    };
+    let shape = CoreShape {
+        radius_m: 0.011,
+        bottom_m: -0.083,
+        top_m: 0.003,
+    };
+    let rows = |columns: usize, [dx, dy]: [f64; 2], shift: f64| -> Vec<[f64; 2]> {
+        (0..3 * columns)
+            .map(|i| {
+                let (row, column) = ((i / columns) as f64, (i % columns) as f64);
+                [0.007 + dx * (column + shift * (row % 2.0)), dy * row]
+            })
+            .collect()
+    };
+    let mut holed = rows(4, [0.043, 0.043], 0.0);
+    holed.swap_remove(5);
+    let scattered = vec![
+        [0.0, 0.0],
+        [0.053, 0.007],
+        [-0.031, 0.049],
+        [0.022, -0.061],
+        [0.21, 0.1],
+    ];
+    for positions_m in [
+        rows(3, [0.047, 0.051], 0.0),
+        rows(2, [0.044, 0.044 * 0.75_f64.sqrt()], 0.5),
+        rows(4, [0.043, 0.043], 0.0),
+        holed,
+        scattered,
+    ] {
+        for tolerance in [1e-3, 1e-5] {
+            assert_whole_and_reduced_agree(&winding, shape, &positions_m, tolerance);
+        }
+    }
+}
+
+/// The same of 36 and 64 cores at the seed's pitch.
+#[test]
+#[ignore = "a minute of the dense solution"]
+fn many_cores_are_what_whole_grids_give() {
+    let winding = Winding {
+        inner_radius_m: 0.012,
+        outer_radius_m: 0.019,
+        length_m: 0.1,
+        turns: 1429.0,
+    };
+    let shape = CoreShape {
+        radius_m: 0.012,
+        bottom_m: -0.11,
+        top_m: 0.0,
+    };
+    for side in [6, 8] {
+        let at = |i: usize| 0.05 * i as f64;
+        let positions_m: Vec<[f64; 2]> = (0..side * side)
+            .map(|i| [at(i % side), at(i / side)])
+            .collect();
+        assert_whole_and_reduced_agree(&winding, shape, &positions_m, 1e-3);
+    }
+}
+
+fn assert_whole_and_reduced_agree(
+    winding: &Winding,
+    shape: CoreShape,
+    positions_m: &[[f64; 2]],
+    tolerance: f64,
+) {
+    let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m(positions_m));
+    let uncoupled = CoupledArray::uncoupled(winding, shape, 470.0, positions_m, &resolution);
+    let (array, excitation) = uncoupled.unwrap();
+    let (mut whole, mut reduced) = (array.clone(), array);
+    whole.couple(&excitation, &resolution);
+    reduced.couple_reduced(&excitation, &resolution);
+    let [a, b] = [&whole, &reduced].map(|array| &array.added_inductance_h);
+    let inductance = (a - b).amax() / a.amax();
+    let cores = positions_m.len();
+    let (mut layer, mut size) = (0.0_f64, 0.0_f64);
+    for (drive, core) in (0..cores * cores).map(|i| (i / cores, i % cores)) {
+        let [a, b] = [&whole, &reduced].map(|array| array.layers(drive, core));
+        layer = layer.max((&a - b).amax());
+        size = size.max(a.amax());
+    }
+    assert!(
+        inductance < 0.1 * tolerance,
+        "{cores} {tolerance:e}: {inductance:e}"
+    );
+    assert!(
+        layer < 0.1 * tolerance * size,
+        "{cores} {tolerance:e}: {layer:e} {size:e}"
+    );
+}
+
+/// A priori rules gave thousands of dipoles a core, ten thousand times as exact as requested.
+#[test]
+fn few_dipoles_stand_for_cores_at_many_points() {
+    let winding = Winding {
+        inner_radius_m: 0.013,
+        outer_radius_m: 0.019,
+        length_m: 0.07,
+        turns: 700.0,
+    };
+    let shape = CoreShape {
+        radius_m: 0.011,
+        bottom_m: -0.083,
+        top_m: 0.003,
+    };
+    let positions_m = [[0.0, 0.0], [0.051, 0.004], [-0.013, 0.047]];
+    let array = CoupledArray::new(&winding, shape, 470.0, &positions_m, 1e-3, 0.013).unwrap();
+    for (lowest_m, tolerance) in [(0.013, 1e-4), (0.029, 1e-5), (0.061, 1e-3)] {
+        let distance_m = lowest_m - shape.top_m;
+        let every = ArraySources::of_array(&array, lowest_m, distance_m, tolerance);
+        let few = ArraySources::for_many_points(&array, lowest_m, distance_m, tolerance);
+        assert!(
+            10 * few.count() < 7 * every.count(),
+            "{} of {}",
+            few.count(),
+            every.count()
+        );
+        let points: Vec<[f64; 3]> = (0..300)
+            .map(|k| {
+                let part = |step: f64| (0.5 + step * f64::from(k)).fract();
+                let (x, y) = (part(0.754_877_666), part(0.569_840_291));
+                [
+                    0.12 * x - 0.04,
+                    0.11 * y - 0.03,
+                    lowest_m * f64::from(1 + k % 3),
+                ]
+            })
+            .collect();
+        let of = |sources: &ArraySources| {
+            let parts = Components::Gradient;
+            let mut out = vec![0.0; positions_m.len() * parts.count() * points.len()];
+            sources.sample(&points, parts, &mut out);
+            out
+        };
+        let pairs: Vec<(f64, f64)> = of(&few).into_iter().zip(of(&every)).collect();
+        for (k, at) in points.iter().enumerate() {
+            let size = winding
+                .field(winding.outer_radius_m, at[2])
+                .unwrap()
+                .gradient_norm();
+            let values = pairs.iter().skip(k).step_by(points.len());
+            let worst = values.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(
+                worst < tolerance * size,
+                "{at:?} {tolerance:e}: {:e}",
+                worst / size
+            );
+        }
+    }
+}
