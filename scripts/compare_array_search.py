@@ -4,6 +4,8 @@
     pip install numpy scipy
     cargo build --release && python3 scripts/compare_array_search.py target/release/fluxform
 
+where better.toml is that of designs/better_display.md; --design names another.
+
 Every optimiser varies the lengths of DESIGN's [search] that are ranges (coil, core, pitch), sees the gain
 that `lambda` computes for the shapes and the limits that `evaluate` checks, as a penalty, and may compute
 as many arrays as `optimize --for` did. Turns are whole for all. Prints median and quartiles of the best
@@ -25,7 +27,7 @@ PENALTY = 20.0
 
 
 def run(program, *arguments):
-    done = subprocess.run([program, *arguments, "--format", "json", "-q"], capture_output=True, text=True)
+    done = subprocess.run([program, *arguments, "--format", "json"], capture_output=True, text=True)
     return json.loads(done.stdout) if done.stdout else None
 
 
@@ -116,7 +118,7 @@ def general(arrays, method, seed, most):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
-    parser.add_argument("--design", default="designs/seed_air_search.toml")
+    parser.add_argument("--design", default="better.toml")
     parser.add_argument("--shapes", nargs="+", default=["shapes/flat.toml", "shapes/half_sphere.toml"])
     parser.add_argument("--evaluations", type=int, default=80)
     parser.add_argument("--seeds", type=int, default=10)

@@ -25,6 +25,10 @@ DESIGN = "designs/seed.toml"
 SHAPES = ["flat", "half_sphere", "half_cylinder", "wedge"]
 TABLE = ROOT / "scripts" / "confusion_table2.csv"
 TRIALS_AN_OBJECT = 40
+# Keys of `compare` and what they are: of the upward force, then of the force vector.
+MEASURES = {
+    "": "largest", "rms_": "rms", "vector_": "largest of the vector", "vector_rms_": "rms of the vector",
+}
 
 
 def program():
@@ -97,14 +101,14 @@ def main():
     pairs = compared(program())["pairs"]
     kinds = [("no", "static"), ("yes", "feedback")]
     print("| pair | " + " | ".join(
-        f"{kind}: largest | rms | confused" for _, kind in kinds) + " |")
-    print("|---|" + "---|" * 6)
+        f"{kind}: largest | rms | vector: largest | rms | confused" for _, kind in kinds) + " |")
+    print("|---|" + "---|" * 10)
     counted = {kind: confusions(feedback) for feedback, kind in kinds}
-    reported = {(kind, what): [] for _, kind in kinds for what in ("", "rms_")}
+    reported = {(kind, what): [] for _, kind in kinds for what in MEASURES}
     for pair in pairs:
         cells = []
         for _, kind in kinds:
-            for what in ("", "rms_"):
+            for what in MEASURES:
                 value = pair[f"{kind}_{what}jnd"]
                 reported[kind, what].append(value)
                 cells.append(f"{value:.2f}")
@@ -115,7 +119,7 @@ def main():
         confused = [counted[kind][frozenset((pair["a"], pair["b"]))] for pair in pairs]
         # The largest with feedback is the same for three pairs but for rounding.
         rho, strong, orders = spearman([round(value, 6) for value in values], confused)
-        print(f"{kind}, {'rms' if what else 'largest'}: rho = {rho:+.2f}, "
+        print(f"{kind}, {MEASURES[what]}: rho = {rho:+.2f}, "
               f"p = {strong / orders:.2f} ({strong} of {orders} orders), n = {len(values)} pairs")
 
 

@@ -45,16 +45,24 @@ def row(name, requested, currents, rendering, largest):
     return "| " + " | ".join(cells) + " |"
 
 
+def static(vector):
+    """What static currents chosen for all three components make of the vector, and their lambda_jnd."""
+    of = vector["static_vector"]
+    return of["at_chosen"]["rendering"], of["lambda_jnd_n_per_m"]
+
+
 def rows(name, upright, normal):
-    """The lines of one shape: eq. 8 of the upward force alone leaves the sideways force as it comes."""
+    """The lines of one shape: eq. 8 of the upward force alone leaves the sideways force as it comes; static
+    currents of `vertical` are chosen for the upward force, the others for all components."""
     constant = upright["lambda_n_per_m"]
     up, along = upright["feedback"]["vector"], normal["feedback"]["vector"]
     of_upward = upright["feedback"]["lambda_n_per_m"]
     return [
         row(name, "vertical", "static", up["static"], constant),
         row(name, "vertical", "feedback", up["upward"], of_upward),
+        row(name, "vertical-only", "static", *static(up)),
         row(name, "vertical-only", "feedback", up["vector"], up["lambda_n_per_m"]),
-        row(name, "normal", "static", along["static"], constant),
+        row(name, "normal", "static", *static(along)),
         row(name, "normal", "feedback", along["vector"], along["lambda_n_per_m"]),
     ]
 

@@ -450,7 +450,8 @@ static int vector_currents(fluxform_bundle *b, double x, double y, double z, dou
     int answer;
     if (!fluxform_force_vectors_per_ampere(b, x, y, z, force))
         return FLUXFORM_OUTSIDE;
-    fluxform_passive_force(b, x, y, z, &s->passive_n);
+    if (b->passive_force_n)
+        fluxform_passive_force(b, x, y, z, &s->passive_n);
     fluxform_direction(b, x, y, &s->height_m, direction);
     for (size_t k = 0; k < 3; k++)
         wanted[k] = b->lambda_n_per_m * s->height_m * direction[k];
@@ -480,7 +481,8 @@ int fluxform_currents(fluxform_bundle *b, double x, double y, double z, double *
         double *force = b->scratch + 3 * b->coil_count;
         answer = FLUXFORM_OUTSIDE;
         if (fluxform_force_per_ampere(b, x, y, z, force)) {
-            fluxform_passive_force(b, x, y, z, &s.passive_n);
+            if (b->passive_force_n)
+                fluxform_passive_force(b, x, y, z, &s.passive_n);
             fluxform_height(b, x, y, &s.height_m);
             s.wanted_n = b->lambda_n_per_m * s.height_m;
             answer = fluxform_allocate(b, force, s.wanted_n - s.passive_n, currents);

@@ -8,15 +8,34 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 /// length, a model's own error).
 const GOVERNED: [&str; 5] = ["field", "inductance", "mutual_inductance", "forces", "map"];
 
+/// Those of the flux density inside a core, which has a coarser default.
+const GOVERNED_IN_CORE: [&str; 2] = ["core_field", "core_field_mean"];
+
 /// The stages that a tolerance governs and that miss it, by name. There is one meaning of
 /// *reached*: every such stage's stated error is at most the tolerance.
 pub fn missed<'a, S: AsRef<str> + 'a>(
     stages: impl IntoIterator<Item = (&'a S, &'a StageAccuracy)>,
     tolerance: f64,
 ) -> Vec<String> {
+    missed_among(&GOVERNED, stages, tolerance)
+}
+
+/// As [`missed`], of the flux density inside a core.
+pub fn missed_in_core<'a, S: AsRef<str> + 'a>(
+    stages: impl IntoIterator<Item = (&'a S, &'a StageAccuracy)>,
+    tolerance: f64,
+) -> Vec<String> {
+    missed_among(&GOVERNED_IN_CORE, stages, tolerance)
+}
+
+fn missed_among<'a, S: AsRef<str> + 'a>(
+    governed: &[&str],
+    stages: impl IntoIterator<Item = (&'a S, &'a StageAccuracy)>,
+    tolerance: f64,
+) -> Vec<String> {
     stages
         .into_iter()
-        .filter(|(name, stage)| GOVERNED.contains(&name.as_ref()) && !stage.meets(tolerance))
+        .filter(|(name, stage)| governed.contains(&name.as_ref()) && !stage.meets(tolerance))
         .map(|(name, stage)| stage.against(name.as_ref(), tolerance))
         .collect()
 }

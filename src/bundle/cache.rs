@@ -60,11 +60,14 @@ impl Origin {
     /// A short name for an entry that is shared by all who ask for this origin: eight hexadecimal digits.
     #[must_use]
     pub fn short_name(&self) -> String {
-        let digest = self.0.clone().finalize();
-        digest[..4]
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect()
+        let first = self.sum().into_iter().take(4);
+        first.map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// The digest of all that was added.
+    #[must_use]
+    pub fn sum(&self) -> [u8; DIGEST] {
+        self.0.clone().finalize().into()
     }
 
     /// The digest of an entry of this origin in `folder`.

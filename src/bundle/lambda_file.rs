@@ -12,8 +12,10 @@ use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
+pub use fluxform_lambda::two_fingers::TwoFingers;
 pub use fluxform_lambda::uncertainty::{CurrentsError, RobustSetting, Study, TradeOff};
 use fluxform_lambda::vector_feedback::VectorRendering;
+pub use fluxform_lambda::vector_static::{VectorCurrents, VectorStatic};
 use fluxform_lambda::worst::ActivePoint;
 use fluxform_lambda::{Criterion, ForceConstants, GivenForce, Wiring};
 
@@ -148,6 +150,9 @@ pub struct FeedbackFile {
     /// The same demand above and below the surface; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shell: Option<FeedbackShell>,
+    /// Two fingers on the array at the chosen lambda; absent when not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub two_fingers: Option<TwoFingers>,
     /// The force vector; absent where the upward force alone is requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vector: Option<VectorFeedbackFile>,
@@ -170,6 +175,9 @@ pub struct VectorFeedbackFile {
     /// The static currents at the chosen lambda; null without one, as the next two.
     #[serde(rename = "static")]
     pub fixed: Option<VectorRendering>,
+    /// Static currents chosen for all three components; absent in files of programs without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub static_vector: Option<VectorStatic>,
     /// Feedback of the upward part alone, at the chosen lambda.
     pub upward: Option<VectorRendering>,
     /// Feedback of all three components, at the chosen lambda.

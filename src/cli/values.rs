@@ -211,6 +211,16 @@ pub fn ends(text: &str) -> Result<Ends, String> {
     }
 }
 
+/// Two distances of fingers, m, the smaller one first and above 0.
+pub fn distances(text: &str) -> Result<Ends, String> {
+    match ends(text)? {
+        Ends([from, _]) if from <= 0.0 => {
+            Err("two fingers cannot be in the same place: write distances above 0".to_owned())
+        }
+        ends => Ok(ends),
+    }
+}
+
 /// `NxM`: samples along x and y.
 pub fn grid_size(text: &str) -> Result<GridSize, String> {
     let sizes: Option<Vec<usize>> = text
@@ -347,6 +357,16 @@ pub fn tilt(text: &str) -> Result<f64, String> {
         Uncertainty::MOST.tilt_deg,
         "10deg",
     )
+}
+
+/// An angle that is just noticed, degrees.
+pub fn direction_jnd(text: &str) -> Result<f64, String> {
+    match tilt(text) {
+        Ok(angle) if (1.0..=89.0).contains(&angle) => Ok(angle),
+        _ => Err(format!(
+            "invalid angle {text:?}: expected 1 to 89deg, like 25deg"
+        )),
+    }
 }
 
 /// How much warmer a magnet may become, C.

@@ -1,5 +1,6 @@
 //! The sections of a design file as read, in the file's units, and which of them a command needs.
 
+use super::iron::{self, Iron, Plate};
 use super::limits::{self, Limits};
 use super::reader::{Located, Section};
 use super::search::{self, SearchSpace};
@@ -78,6 +79,8 @@ pub(super) struct Draft {
     pub(super) coil: Option<CoilDraft>,
     pub(super) wire: WireDraft,
     pub(super) core: Option<CoreDraft>,
+    pub(super) plate: Option<Plate>,
+    pub(super) iron: Vec<Iron>,
     pub(super) array: ArrayDraft,
     pub(super) magnet: MagnetDraft,
     pub(super) supply: SupplyDraft,
@@ -101,6 +104,12 @@ impl Draft {
             coil: sections::coil(root.section("coil")),
             wire: sections::wire(root.section("wire")),
             core: sections::core(root.section("core")),
+            plate: iron::plate(root.section("plate")),
+            iron: root
+                .sections("iron")
+                .into_iter()
+                .filter_map(iron::body)
+                .collect(),
             array: sections::array(root.section("array")),
             magnet: sections::magnet(root.section("magnet")),
             supply: sections::supply(root.section("supply")),

@@ -12,7 +12,7 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 /// The keys of a design.
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
-    const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[array]\n[magnet]\n[supply]\n[limits]\n\
+    const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[plate]\n[[iron]]\n[array]\n[magnet]\n[supply]\n[limits]\n\
                             [uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
                             [search.core]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
@@ -76,6 +76,31 @@ const MEANINGS: &[(&str, &str)] = &[
         "core.lamination_mm",
         "thickness of the core's sheets; without it the core is solid",
     ),
+    ("plate.thickness_mm", "the plate's thickness"),
+    ("plate.x_mm", "its side along x"),
+    ("plate.y_mm", "its side along y"),
+    ("plate.diameter_mm", "of a round plate, instead of sides"),
+    (
+        "plate.gap_mm",
+        "from the cores' lower ends (without cores the windings') down to it; at 0 cores join it",
+    ),
+    ("plate.relative_permeability", "of its linear steel"),
+    (
+        "plate.knee_t",
+        "flux density from which its steel saturates",
+    ),
+    ("iron.shape", "the body's shape"),
+    ("iron.size_mm", "a box's sides along x, y and z"),
+    (
+        "iron.diameter_mm",
+        "outer diameter of a cylinder or tube about z, or of a ball",
+    ),
+    ("iron.inner_diameter_mm", "of a tube"),
+    ("iron.length_mm", "of a cylinder or a tube"),
+    ("iron.center_mm", "its middle"),
+    ("iron.rotate_deg", "rotation about x, then y, then z"),
+    ("iron.relative_permeability", "of its linear steel"),
+    ("iron.knee_t", "flux density from which its steel saturates"),
     ("array.positions_mm", "the coils' axes, instead of a grid"),
     ("array.rows", "rows of the grid, along y"),
     ("array.columns", "columns of the grid, along x"),

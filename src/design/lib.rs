@@ -34,6 +34,7 @@ pub mod commented;
 pub mod diagnostics;
 mod draft;
 pub mod gauge;
+pub mod iron;
 mod key;
 pub mod keys;
 mod limits;

@@ -1,5 +1,6 @@
 //! The contents of a design file, validated, in SI units.
 
+use super::iron::{Iron, Plate};
 use super::key::Assumed;
 use super::limits::Limits;
 use super::search::SearchSpace;
@@ -20,6 +21,10 @@ pub struct Design {
     pub wire: Wire,
     /// The steel core; `None` for an air coil.
     pub core: Option<Core>,
+    /// The plate below the coils, if there is one.
+    pub plate: Option<Plate>,
+    /// Other bodies of steel.
+    pub iron: Vec<Iron>,
     /// Where the coils are.
     pub array: Array,
     /// The finger's magnet.
@@ -71,6 +76,12 @@ pub struct Wire {
 }
 
 impl Design {
+    /// Whether there is steel beyond the cores.
+    #[must_use]
+    pub fn has_iron(&self) -> bool {
+        self.plate.is_some() || !self.iron.is_empty()
+    }
+
     /// The B-H table that it names.
     #[must_use]
     pub fn curve_file(&self) -> Option<&Path> {

@@ -72,6 +72,8 @@ impl Draft {
             coil: self.coil.map(coil_m),
             wire: wire_m(self.wire),
             core: self.core.map(|core| core_m(core, path)),
+            plate: self.plate,
+            iron: self.iron,
             array: Array {
                 positions_m,
                 grid: match self.array.layout {

@@ -196,6 +196,35 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// The tables `[[name]]` of this one.
+    pub fn sections(&mut self, name: &'static str) -> Vec<Section<'a>> {
+        let Some(found) = self.found(name) else {
+            return Vec::new();
+        };
+        let DeValue::Array(tables) = found.get_ref() else {
+            self.add_wrong_type(&self.path_of(name), found, &format!("sections [[{name}]]"));
+            return Vec::new();
+        };
+        let section = |(number, table): (usize, ValueRef<'a>)| {
+            let path = match &self.sink.keys {
+                Some(_) => self.path_of(name),
+                None => format!("{}[{number}]", self.path_of(name)),
+            };
+            let DeValue::Table(of) = table.get_ref() else {
+                self.add_wrong_type(&path, table, &format!("a section [[{name}]]"));
+                return None;
+            };
+            Some(Section {
+                sink: self.sink,
+                path,
+                span: table.span(),
+                table: Some(of),
+                known: Vec::new(),
+            })
+        };
+        tables.iter().enumerate().filter_map(section).collect()
+    }
+
     /// True when the document has this table.
     #[must_use]
     pub fn is_present(&self) -> bool {

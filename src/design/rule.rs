@@ -229,3 +229,13 @@ pub(crate) const fn metres_below(size: f64) -> Slip {
 
 /// Sizes of coils, arrays and workspaces, mm: half a metre is 0.5.
 pub const BODY_MM: Rule = Rule::any("mm").slips(&[metres_below(0.5)]);
+
+/// Sizes of magnets, mm.
+pub(crate) const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
+
+/// Gaps and overhangs, mm.
+pub(crate) const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
+
+/// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
+/// conductor is named, it is taken as the diameter over the insulation too.
+pub(crate) const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();

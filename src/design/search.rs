@@ -6,8 +6,7 @@
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use super::reader::Section;
-use super::rule::{BODY_MM, Bound, Rule};
-use super::sections::{MAGNET_MM, OFFSET_MM, WIRE_MM};
+use super::rule::{BODY_MM, Bound, MAGNET_MM, OFFSET_MM, Rule, WIRE_MM};
 
 /// A key that may be searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use super::array::{COILS_MAX, grid_positions_m};
 use super::message_text::number;
 use super::model::{ArrayGrid, Coupling, Driver, MagnetModel, Polarity};
 use super::reader::{Located, Section};
-use super::rule::{BODY_MM, Bound, Rule, metres_below, slip};
+use super::rule::{BODY_MM, Bound, MAGNET_MM, OFFSET_MM, Rule, WIRE_MM, slip};
 use super::values::OneOrMany;
 use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
@@ -17,21 +17,14 @@ use fluxform_numerics::axis::Axis;
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Knee of low-carbon steel that is described by its permeability alone, T.
-const LOW_CARBON_KNEE_T: f64 = 1.5;
+pub(super) const LOW_CARBON_KNEE_T: f64 = 1.5;
 
 /// Relative permeability of the reference design's steel.
-const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
+pub(super) const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
 
-/// Sizes of magnets, mm.
-pub(super) const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
-/// Gaps and overhangs, mm.
-pub(super) const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
-/// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
-/// conductor is named, it is taken as the diameter over the insulation too.
-pub(super) const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
 /// Metals lie between 1e-8 and 2e-6.
 const RESISTIVITY_OHM_M: Rule = Rule::any("ohm m").slips(&[
     slip(0.0, 1e-9, "a slip of the exponent", 1.0),
@@ -47,10 +40,11 @@ const CONDUCTIVITY_S_PER_M: Rule = Rule::any("S/m")
     .bound(Bound::NotNegative)
     .slips(&[slip(0.0, 1000.0, "MS/m", 1e6)]);
 /// From vacuum to beyond any metal. The slips: mu itself in H/m, and thousands.
-const RELATIVE_PERMEABILITY: Rule = Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
-    slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
-    slip(0.125, 1.0, "thousands", 1000.0),
-]);
+pub(super) const RELATIVE_PERMEABILITY: Rule =
+    Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
+        slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
+        slip(0.125, 1.0, "thousands", 1000.0),
+    ]);
 const AMPERE: Rule = Rule::any("A");
 const BANDWIDTH_HZ: Rule = Rule::any("Hz");
 

@@ -64,9 +64,11 @@ mod qr_reduction;
 mod rest;
 pub mod sideways;
 mod solve;
+pub mod two_fingers;
 pub mod uncertainty;
 mod vector_allocation;
 pub mod vector_feedback;
+pub mod vector_static;
 mod wiring;
 pub mod worst;
 

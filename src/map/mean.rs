@@ -172,6 +172,10 @@ impl<'a> MeanField<'a> {
             return Ok(None);
         };
         let radii = layout.nodes();
+        let rows = shares
+            .par_iter()
+            .map(|(offset_m, _)| self.source_row(*offset_m, z_m))
+            .collect::<Result<Vec<_>, MapError>>()?;
         let mut means: Vec<f64> = Vec::new();
         let mut before = 0;
         for azimuths in AZIMUTHS {
@@ -181,7 +185,7 @@ impl<'a> MeanField<'a> {
                 .filter(|k| step == 1 || k % step == 1)
                 .map(|k| TAU * k as f64 / azimuths as f64)
                 .collect();
-            let more = self.means(shares, z_m, &radii, &angles)?;
+            let more = self.means(shares, &rows, &radii, &angles);
             means = interleaved(&means, &more, (before, angles.len(), radii.len()));
             before = azimuths;
             let series = modes(&means, azimuths, radii.len());
@@ -210,56 +214,53 @@ impl<'a> MeanField<'a> {
         Ok(None)
     }
 
-    /// Means about the axis at `angles`, [component][azimuth][radius].
+    /// Means about the axis at `angles`, [component][azimuth][radius], of sources whose `rows` are known.
     fn means(
         &self,
         shares: &Shares,
-        z_m: f64,
+        rows: &[Option<Vec<Table>>],
         radii: &[f64],
         angles: &[f64],
-    ) -> Result<Vec<f64>, MapError> {
+    ) -> Vec<f64> {
         let size = self.count * angles.len() * radii.len();
-        let sums = shares
+        let sums: Vec<Vec<f64>> = shares
             .par_chunks(PORTION)
-            .map(|shares| {
+            .zip(rows.par_chunks(PORTION))
+            .map(|(shares, rows)| {
                 let mut sum = vec![0.0; size];
-                for (offset_m, share) in shares {
+                for ((offset_m, share), row) in shares.iter().zip(rows) {
                     fluxform_base::progress::poll();
-                    self.add(*offset_m, *share, z_m, (radii, angles), &mut sum)?;
+                    if let Some(row) = row {
+                        self.add(*offset_m, *share, row, (radii, angles), &mut sum);
+                    }
                 }
-                Ok(sum)
+                sum
             })
-            .collect::<Result<Vec<Vec<f64>>, MapError>>()?;
+            .collect();
         let mut total = vec![0.0; size];
         for sum in sums {
             for (total, value) in total.iter_mut().zip(sum) {
                 *total += value;
             }
         }
-        Ok(total)
+        total
     }
 
-    /// Adds one place's share.
-    fn add(
-        &self,
-        [ox, oy, oz]: [f64; 3],
-        share: f64,
-        z_m: f64,
-        (radii, angles): (&[f64], &[f64]),
-        sum: &mut [f64],
-    ) -> Result<(), MapError> {
+    /// The source at the height of one place of a mean at `z_m`: series in the radius there, the same for
+    /// all azimuths.
+    fn source_row(&self, [ox, oy, oz]: [f64; 3], z_m: f64) -> Result<Option<Vec<Table>>, MapError> {
+        fluxform_base::progress::poll();
         let z_m = z_m + oz;
         let wanted = if self.count == 1 {
             Components::Gz
         } else {
             Components::Gradient
         };
-        // At one height the source, too, is a series in the radius.
         let farthest_m = self.radius_m + ox.hypot(oy);
         let above_m = z_m - self.source.top_m();
         let aim = self.source_tolerance;
         let Some(layout) = Layout::new(0.0, farthest_m, above_m, aim, usize::MAX) else {
-            return Ok(());
+            return Ok(None);
         };
         let nodes = layout.nodes();
         let heights = vec![z_m; nodes.len()];
@@ -269,6 +270,18 @@ impl<'a> MeanField<'a> {
             tables.push(layout.table(&values.dbr_dz_over_r));
             tables.push(layout.table(&values.br_over_r));
         }
+        Ok(Some(tables))
+    }
+
+    /// Adds one place's share.
+    fn add(
+        &self,
+        [ox, oy, _]: [f64; 3],
+        share: f64,
+        tables: &[Table],
+        (radii, angles): (&[f64], &[f64]),
+        sum: &mut [f64],
+    ) {
         let size = angles.len() * radii.len();
         let mut distances = vec![0.0; radii.len()];
         let mut found = vec![0.0; tables.len() * radii.len()];
@@ -280,7 +293,7 @@ impl<'a> MeanField<'a> {
                 *distance = (x * x + y * y).sqrt();
             }
             dispatch::run(Scattered {
-                tables: &tables,
+                tables,
                 points: &distances,
                 out: &mut found,
             });
@@ -305,7 +318,6 @@ impl<'a> MeanField<'a> {
                 }
             }
         }
-        Ok(())
     }
 }
 

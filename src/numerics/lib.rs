@@ -3,6 +3,7 @@
 pub mod anderson;
 pub mod axis;
 pub mod bessel;
+pub mod block_toeplitz;
 pub mod chebyshev;
 pub mod dispatch;
 pub mod double_double;

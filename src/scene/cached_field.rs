@@ -32,6 +32,8 @@ use crate::shape::document::ShapeDocument;
 
 /// Name of the folder beside a design's bundles.
 pub const STORE_FOLDER: &str = ".fluxform-cache";
+/// Most values of a map that is held for the next shape.
+const MOST_NODES_HELD: usize = 8_000_000;
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
 
@@ -46,6 +48,8 @@ pub struct FieldStore {
     inspection: OnceLock<Inspection>,
     /// The pull that the design leaves out, over the region of the last shape.
     pull: Mutex<Option<(Region, Arc<Option<PassivePull>>)>>,
+    /// The last shape's map and the digest of what it was made from.
+    last_map: Mutex<Option<([u8; 32], SceneMap)>>,
 }
 
 impl FieldStore {
@@ -55,7 +59,7 @@ impl FieldStore {
     pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
-        let store = if design.core.is_some() {
+        let store = if design.core.is_some() || design.has_iron() {
             store
         } else {
             Store::none()
@@ -67,6 +71,7 @@ impl FieldStore {
                 &design.coil,
                 &design.wire,
                 &design.core,
+                (&design.plate, &design.iron),
                 &design.array,
                 &design.magnet,
                 design.workspace.z_m.from,
@@ -86,6 +91,7 @@ impl FieldStore {
             field,
             inspection: OnceLock::new(),
             pull: Mutex::new(None),
+            last_map: Mutex::new(None),
         }
     }
 
@@ -260,9 +266,15 @@ impl<'a> ShapeField<'a> {
         progress: &dyn Progress,
     ) -> Result<SceneMap, RunError> {
         let compute = || SceneMap::new(scene, solved, coils, grid, components, magnet, progress);
-        let Some((FieldStore { store, field, .. }, _)) = self.cached else {
+        let Some((cached, _)) = self.cached else {
             return compute();
         };
+        let FieldStore {
+            store,
+            field,
+            last_map,
+            ..
+        } = cached;
         let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
         let what = format!("{:?}", (coils, components, magnet));
         let of_grid = |origin: Origin| {
@@ -275,7 +287,15 @@ impl<'a> ShapeField<'a> {
         let kind = Origin::of_build(components.name());
         let name = format!("map-{}", of_grid(kind).short_name());
         let origin = of_grid(field.clone().and(what.as_bytes()));
-        store.remember(&name, &origin, compute)
+        let sum = origin.sum();
+        let mut last = last_map.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, map)) = last.as_ref().filter(|(of, _)| *of == sum) {
+            return Ok(map.clone());
+        }
+        let made = store.remember(&name, &origin, compute)?;
+        let small = made.map.gz_t_per_m_per_a.len() <= MOST_NODES_HELD;
+        *last = small.then(|| (sum, made.clone()));
+        Ok(made)
     }
 }
 

@@ -130,8 +130,8 @@ impl MapTask<'_> {
             grid,
             magnet,
         } = *self;
-        if let Some(core) = &scene.core {
-            clearance_m(scene, core, &lowest_plane(grid), magnet.reach_m)?;
+        if solved.has_steel() {
+            clearance_m(scene, &lowest_plane(grid), magnet.reach_m)?;
         }
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             tabulate(source, coils, grid, components, tolerance, p)
@@ -177,8 +177,12 @@ impl MapTask<'_> {
             grid,
             magnet,
         } = *self;
-        let lowest = lowest_plane(grid);
-        let steel = solved.sources(scene, &lowest, magnet.reach_m, magnet.amplification)?;
+        let nearest = match &scene.iron {
+            // It may be beside or above any node.
+            Some(_) => every_node(grid),
+            None => lowest_plane(grid),
+        };
+        let steel = solved.sources(scene, &nearest, magnet.reach_m, magnet.amplification)?;
         let steel = steel.as_deref().and_then(SteelField::coupled);
         let steel = steel.ok_or_else(no_steel)?;
         // A grid through every place that a node of the magnet can take.
@@ -269,12 +273,13 @@ impl MagnetMean {
     /// # Errors
     /// A magnet that touches what it is attracted by.
     pub fn by_magnet(scene: &Scene, z_m: &[f64], tolerance: f64) -> Result<Self, RunError> {
-        let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+        let top_m = scene.sources_top_m();
         let mut magnet = Self {
             layers: Vec::new(),
             ..Self::field()
         };
-        let most = if scene.core.is_some() && !coupled(scene.design) {
+        let alone = scene.iron.is_none() && !coupled(scene.design);
+        let most = if scene.core.is_some() && alone {
             MOST_AMPLIFICATION_OF_TABLES
         } else {
             MOST_AMPLIFICATION
@@ -536,6 +541,17 @@ pub(crate) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
         .collect()
 }
 
+fn every_node(grid: &Grid) -> Vec<[f64; 3]> {
+    let plane = lowest_plane(grid);
+    let lifted = |z: &f64| {
+        plane
+            .iter()
+            .map(|[x, y, _]| [*x, *y, *z])
+            .collect::<Vec<_>>()
+    };
+    grid.z_m.iter().flat_map(lifted).collect()
+}
+
 /// Nodes of a map to be compared: every second one of the lowest plane.
 fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
     let (nx, ny) = (map.x_m.len(), map.y_m.len());
@@ -580,7 +596,7 @@ fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
 /// The map's own error at its nodes.
 fn accuracy(evaluation: Evaluation, solved: &Solved, magnet: f64) -> StageAccuracy {
     let Evaluation { estimate, method } = evaluation;
-    let table = if solved.steel().coupled().is_some() {
+    let table = if solved.steel().couples() {
         ", its table by comparison with direct values"
     } else {
         ""

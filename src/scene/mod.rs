@@ -7,6 +7,7 @@ pub mod cost;
 pub mod drawing;
 pub mod evaluation_sample;
 pub mod felt_force;
+pub mod iron;
 pub mod maps;
 pub mod neighbours;
 pub mod passive;
@@ -40,6 +41,7 @@ use crate::map::tabulate::PlacedCoil;
 use crate::numerics::vec3::{cross, dot};
 use crate::progress::Progress;
 use crate::scene::core_material::SceneCore;
+use crate::scene::iron::SceneIron;
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
 
@@ -109,6 +111,8 @@ pub struct Scene<'a> {
     pub winding: Winding,
     /// The steel of every core; `None` for air coils.
     pub core: Option<SceneCore>,
+    /// The plate and other bodies of steel; `None` where cores are all there is.
+    pub iron: Option<SceneIron>,
     /// Resistance, inductance without steel, wire.
     pub circuit: Circuit,
     /// The coils of the array.
@@ -147,6 +151,7 @@ impl<'a> Scene<'a> {
             .as_ref()
             .map(|core| SceneCore::new(core, &winding))
             .transpose()?;
+        let iron = SceneIron::new(design, &winding, core.as_ref())?;
         let coils = design
             .array
             .positions_m
@@ -168,6 +173,7 @@ impl<'a> Scene<'a> {
             coil,
             winding,
             core,
+            iron,
             coils,
             moment_a_m2: moment_a_m2(design),
             upper_a,
@@ -248,10 +254,28 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Height of the highest winding or core, m.
+    /// Height of the highest winding or steel, m.
     #[must_use]
     pub fn sources_top_m(&self) -> f64 {
-        self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0))
+        self.steel_extent_m()
+            .map_or(0.0, |(top_m, _)| top_m.max(0.0))
+    }
+
+    /// Height of the highest steel, and the length from which on it is far away, m; `None` without any.
+    #[must_use]
+    pub fn steel_extent_m(&self) -> Option<(f64, f64)> {
+        let cores = self
+            .core
+            .as_ref()
+            .map(|core| (core.shape.top_m, core.shape.length_m()));
+        let iron = self
+            .iron
+            .as_ref()
+            .map(|iron| (iron.top_m, self.winding.length_m));
+        match (cores, iron) {
+            (Some(cores), Some(iron)) => Some((cores.0.max(iron.0), cores.1.max(iron.1))),
+            (cores, iron) => cores.or(iron),
+        }
     }
 
     /// Rows of points that share a rule for the magnet, with a height none of them is below: those
@@ -503,10 +527,11 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Whether the design's cores are coupled.
+/// Whether the design's cores are coupled, and the only steel.
 #[must_use]
 pub fn coupled(design: &Design) -> bool {
     design.core.is_some()
+        && !design.has_iron()
         && design.array.coupling == Coupling::Full
         && design.array.positions_m.len() > 1
 }

@@ -13,7 +13,7 @@ use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
 use crate::field::components::Components;
-use crate::field::steel::array_steel::TWO_OF_COUPLED_CORES;
+use crate::field::iron::array::IronPeaks;
 use crate::field::steel::core_flux_density::peak_depth_m;
 
 /// The array's inductances.
@@ -31,9 +31,49 @@ pub struct ArraySummary {
     /// With a B-H curve: all coils at their rated currents.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointSummary>,
+    /// With a plate or other bodies of steel: what they carry.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iron: Option<IronSummary>,
     /// The stages that miss the tolerance.
     #[serde(skip)]
     pub(crate) accuracy_missed: Vec<String>,
+}
+
+/// A plate and other bodies of steel, with all coils at their rated currents.
+#[derive(Debug, Clone, Serialize)]
+pub struct IronSummary {
+    /// Largest |B| in them, well inside the surface, T.
+    pub peak_field_t: f64,
+    /// Where, m.
+    pub peak_at_m: [f64; 3],
+    /// Flux density above which their steel is no longer linear, T.
+    pub knee_t: f64,
+    /// Five time constants of the slowest coil among all steel, s.
+    pub settling_s: f64,
+}
+
+fn iron_summary(
+    scene: &Scene,
+    matrix: &[Vec<f64>],
+    peaks: &IronPeaks,
+    warnings: &mut Vec<String>,
+) -> Option<IronSummary> {
+    let iron = scene.iron.as_ref()?;
+    warnings.extend(iron.above_knee(scene, peaks, "all coils at their rated currents"));
+    let alone = "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
+                 has the coils among all steel";
+    warnings.push(alone.to_owned());
+    Some(IronSummary {
+        peak_field_t: peaks.elsewhere.0,
+        peak_at_m: peaks.elsewhere.1,
+        knee_t: iron.knee_t,
+        settling_s: settling_s(scene, matrix),
+    })
+}
+
+fn settling_s(scene: &Scene, matrix: &[Vec<f64>]) -> f64 {
+    let own = matrix.iter().enumerate().map(|(coil, row)| row[coil]);
+    5.0 * own.fold(0.0, f64::max) / scene.circuit.resistance_ohm
 }
 
 /// All coils at their rated currents, along the B-H curve.
@@ -69,13 +109,13 @@ pub struct ArrayCoil {
     pub current_max_a: f64,
 }
 
-/// The array among its neighbours; `None` for a single coil.
+/// The array among its neighbours and other steel; `None` for a single coil without either.
 pub(crate) fn array(
     scene: &Scene,
     accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
     warnings: &mut Vec<String>,
 ) -> Result<Option<ArraySummary>, RunError> {
-    if scene.coils.len() < 2 {
+    if scene.coils.len() < 2 && scene.iron.is_none() {
         return Ok(None);
     }
     let axes = &scene.design.array.positions_m;
@@ -110,6 +150,13 @@ pub(crate) fn array(
             "a core of the array with all coils at their rated currents",
         ));
     }
+    let peaks = (scene.iron.as_ref())
+        .map(|iron| iron.peaks(&solved, &scene.upper_a))
+        .transpose()?;
+    let iron = peaks.and_then(|peaks| {
+        peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
+        iron_summary(scene, &matrix, &peaks, warnings)
+    });
     let coils = axes
         .iter()
         .enumerate()
@@ -130,6 +177,7 @@ pub(crate) fn array(
             .is_some()
             .then_some(solved.relative_permeability),
         working_point,
+        iron,
         accuracy_missed,
     }))
 }
@@ -155,10 +203,10 @@ pub(crate) fn inductances(
             *value += solved.steel().added_inductance_h(i, j);
         }
     }
-    if solved.steel().coupled().is_some() {
+    if let (true, Some(known)) = (solved.steel().couples(), solved.steel_method()) {
         estimate += solved.steel_error;
         relative_to = "the largest self inductance";
-        method = TWO_OF_COUPLED_CORES;
+        method = known;
     } else if solved.has_steel() {
         method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
                   those of the windings in air";

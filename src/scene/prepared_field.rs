@@ -15,9 +15,12 @@ const MOST_MOMENTS: usize = 4_000_000;
 /// Clearances and tolerance that a field is prepared for, to the bit.
 type Key = [u64; 3];
 
+/// A field by what it was prepared for.
+type Prepared = (Key, Arc<SteelField>);
+
 /// The field of one solution as it was last prepared; copies of the solution share it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct PreparedField(Arc<Mutex<Vec<(Key, Arc<SteelField>)>>>);
+pub(super) struct PreparedField(Arc<Mutex<Vec<Prepared>>>);
 
 impl PreparedField {
     /// The field of `steel`, whose cores end at `top_m`, at places no lower than `lowest_m` and no closer

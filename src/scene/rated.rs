@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Scene;
 use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
-use crate::accuracy::{StageAccuracy, missed};
+use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
@@ -89,6 +89,11 @@ impl Rated {
             .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
         let target = single.target(scene, current_a)?;
+        let mut accuracy_missed = missed(&single.accuracy, single.tolerance);
+        accuracy_missed.extend(missed_in_core(
+            &single.accuracy,
+            scene.tolerances.core_field,
+        ));
         let mut rated = Self {
             coil: CoilSummary {
                 size: CoilSize::from(&scene.coil),
@@ -108,7 +113,7 @@ impl Rated {
             relative_permeability: single.relative_permeability,
             core: single.core,
             limits: BTreeMap::new(),
-            accuracy_missed: missed(&single.accuracy, single.tolerance),
+            accuracy_missed,
             accuracy: single.accuracy,
             warnings: single.warnings,
         };

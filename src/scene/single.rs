@@ -148,6 +148,31 @@ impl Single {
         Self::linear(scene, core)
     }
 
+    /// Self inductance, H, and where it is limited the core's flux density, T: no more than a search of
+    /// designs needs.
+    pub(crate) fn essentials(scene: &Scene) -> Result<(f64, Option<f64>), RunError> {
+        let air_h = scene.circuit.inductance_h;
+        match &scene.core {
+            None => Ok((air_h, None)),
+            Some(core)
+                if scene.design.limits.core_field_max_t.is_none()
+                    && matches!(core.material, Material::Linear(_)) =>
+            {
+                let (mu_r, height_m) = (core.relative_permeability(), scene.design.target_height_m);
+                let tolerance = scene.tolerances.coil;
+                let coil = CoredCoil::new(&scene.winding, core.shape, mu_r, tolerance, height_m)?;
+                Ok((air_h + coil.added_inductance_h, None))
+            }
+            Some(_) => {
+                let single = Self::new(scene)?;
+                Ok((
+                    single.inductance_h,
+                    single.core.map(|core| core.peak_field_t),
+                ))
+            }
+        }
+    }
+
     fn in_air(scene: &Scene) -> Result<Self, RunError> {
         let height_m = scene.design.target_height_m;
         let accuracy = BTreeMap::from([

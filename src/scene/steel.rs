@@ -5,9 +5,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::core_material::{Material, SceneCore};
+use super::iron::SceneIron;
 use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
+use crate::field::iron::array::IronArray;
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
@@ -34,6 +36,8 @@ enum Steel {
     Alone(Box<AloneCore>),
     /// All cores answer to every winding.
     Coupled(Box<CoupledArray>),
+    /// Steel of any shape answers to every winding.
+    Iron(Box<IronArray>),
 }
 
 impl Steel {
@@ -43,6 +47,7 @@ impl Steel {
             Self::None => &NoSteel,
             Self::Alone(core) => &**core,
             Self::Coupled(array) => &**array,
+            Self::Iron(array) => &**array,
         }
     }
 }
@@ -179,10 +184,10 @@ impl Solved {
         reach_m: f64,
         amplification: f64,
     ) -> Result<Option<Arc<SteelField>>, RunError> {
-        let Some(core) = &scene.core else {
+        if !self.has_steel() {
             return Ok(None);
-        };
-        let (lowest_m, distance_m) = clearance_m(scene, core, points_m, reach_m)?;
+        }
+        let (lowest_m, distance_m) = clearance_m(scene, points_m, reach_m)?;
         Ok(self.sources_at(scene, [lowest_m, distance_m], amplification))
     }
 
@@ -195,54 +200,64 @@ impl Solved {
         clearances_m: [f64; 2],
         amplification: f64,
     ) -> Option<Arc<SteelField>> {
-        let top_m = scene.core.as_ref()?.shape.top_m;
+        let (top_m, _) = scene.steel_extent_m()?;
         let tolerance = EVALUATION_SHARE * self.tolerance / amplification;
         let prepared = &self.prepared;
         prepared.of(self.steel(), top_m, clearances_m, tolerance)
     }
 }
 
-/// How low places within `reach_m` of `points_m` go, and how close to any core: at most its
+/// How low places within `reach_m` of `points_m` go, and how close to any steel: at most a core's
 /// length, beyond which rings need be no finer; m.
 ///
 /// # Errors
 /// A point on the steel's surface or hardly off it.
 pub(crate) fn clearance_m(
     scene: &Scene,
-    core: &SceneCore,
     points_m: &[[f64; 3]],
     reach_m: f64,
 ) -> Result<(f64, f64), RunError> {
-    let shape = core.shape;
+    let (top_m, far_m) = scene.steel_extent_m().unwrap_or_default();
     let (mut lowest_m, mut distance_m) = (f64::INFINITY, f64::INFINITY);
     for (number, [x, y, z]) in points_m.iter().enumerate() {
         lowest_m = lowest_m.min(*z);
         // Seen from farther than its length a core needs no finer rings.
-        if *z > shape.top_m + shape.length_m() {
+        if *z > top_m + far_m {
             continue;
         }
-        let distance = clearance_of_m(scene, core, number + 1, [*x, *y, *z], reach_m)?;
+        let distance = clearance_of_m(scene, number + 1, [*x, *y, *z], reach_m)?;
         distance_m = distance_m.min(distance);
     }
-    Ok((
-        lowest_m - reach_m,
-        distance_m.min(shape.length_m()) - reach_m,
-    ))
+    Ok((lowest_m - reach_m, distance_m.min(far_m) - reach_m))
 }
 
-/// Distance of point `number` from the nearest core, at most a core's length, m.
+/// Distance of point `number` from the nearest steel, at most a core's length, m.
 ///
 /// # Errors
 /// A place within `reach_m` of the point on the steel's surface or hardly off it.
 pub(crate) fn clearance_of_m(
     scene: &Scene,
-    core: &SceneCore,
     number: usize,
     [x, y, z]: [f64; 3],
     reach_m: f64,
 ) -> Result<f64, RunError> {
-    let shape = core.shape;
-    let mut distance_m = shape.length_m();
+    let (_, mut distance_m) = scene.steel_extent_m().unwrap_or_default();
+    if let Some(iron) = &scene.iron {
+        let distance = iron.distance_m([x, y, z]);
+        let least_m = CLOSEST * scene.winding.inner_radius_m;
+        if distance - reach_m < least_m {
+            return Err(RunError::Input(format!(
+                "point {number} ({x}, {y}, {z} m) is {:.3} mm from the surface of [plate] or [[iron]] (below \
+                 nothing: inside), where the field is not resolved; keep {:.3} mm away from it",
+                distance * 1e3,
+                (reach_m + least_m) * 1e3
+            )));
+        }
+        distance_m = distance_m.min(distance);
+    }
+    let Some(SceneCore { shape, .. }) = &scene.core else {
+        return Ok(distance_m);
+    };
     for coil in &scene.coils {
         let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
         let distance = shape.distance_m(r, z);
@@ -267,6 +282,9 @@ pub(crate) fn clearance_of_m(
 /// # Errors
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
 pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, RunError> {
+    if let Some(iron) = &scene.iron {
+        return solve_iron(scene, iron, tolerance, lowest_m);
+    }
     let Some(core) = &scene.core else {
         return Ok(Solved::in_air(tolerance));
     };
@@ -341,6 +359,23 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         steel_error,
         steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
+        prepared: PreparedField::default(),
+    })
+}
+
+fn solve_iron(
+    scene: &Scene,
+    iron: &SceneIron,
+    tolerance: f64,
+    lowest_m: f64,
+) -> Result<Solved, RunError> {
+    let array = iron.solve(scene, STEEL_SHARE * tolerance, lowest_m)?;
+    let core = scene.core.as_ref();
+    Ok(Solved {
+        tolerance,
+        steel_error: array.relative_error,
+        steel: Steel::Iron(Box::new(array)),
+        relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
         prepared: PreparedField::default(),
     })
 }

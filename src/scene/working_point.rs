@@ -242,8 +242,8 @@ impl WorkingPoint {
         {
             add(values, *current);
         }
-        if let Some(core) = &scene.core {
-            let (lowest_m, distance_m) = clearance_m(scene, core, &lowest_plane(grid), 0.0)?;
+        if scene.core.is_some() {
+            let (lowest_m, distance_m) = clearance_m(scene, &lowest_plane(grid), 0.0)?;
             let steel = self.field(scene, lowest_m, distance_m);
             let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, 1, progress)?;
             let all = PlacedCoil {
@@ -275,10 +275,10 @@ impl WorkingPoint {
             .collect();
         let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
         let rule = scene.magnet_rule(lowest_m, MAGNET_SHARE * self.tolerance)?;
-        let Some(core) = &scene.core else {
+        if scene.core.is_none() {
             return Ok(total);
-        };
-        let (lowest_m, distance_m) = clearance_m(scene, core, points_m, rule.reach_m())?;
+        }
+        let (lowest_m, distance_m) = clearance_m(scene, points_m, rule.reach_m())?;
         let field = self.field(scene, lowest_m, distance_m);
         let parts = if rule.is_upright() {
             Components::Gz

@@ -36,6 +36,9 @@ pub struct ShapeDocument {
     pub grid: GridRequest,
     /// The force that is requested over it.
     pub force: RequestedForce,
+    /// Angle between forces that a finger just notices, degrees: how sideways errors of static currents
+    /// count beside upward ones.
+    pub direction_jnd_deg: f64,
     /// Whether the document or a flag gives that grid's samples.
     pub grid_is_given: bool,
     /// How the points count in the mean over the object; `None` where nothing says it.

@@ -98,8 +98,23 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let normal = normal(facet);
         let level = LEVEL * dot(normal, normal).sqrt();
         let p = [point[0], point[1]];
-        let top = point_flags::at(triangles, index.at(p), p, rules);
-        let covered = top.is_some_and(|(top, _)| top.height_m > point[2] + depth_m);
+        // What ends below the point, or lies beside it, does not cover it; its own facet is met in any
+        // case.
+        let seen_m = point[2] + depth_m;
+        let rises = |at: &u32| {
+            let [a, b, c] = &triangles[*at as usize];
+            let beside = |k: usize| {
+                let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+                p[k] < low - 2.0 * rules.reach_m || p[k] > high + 2.0 * rules.reach_m
+            };
+            let covers = a[2].max(b[2]).max(c[2]) > seen_m && !beside(0) && !beside(1);
+            covers || *at as usize == facet
+        };
+        let above: Vec<u32> = index.at(p).iter().copied().filter(rises).collect();
+        let others = above.iter().any(|at| *at as usize != facet);
+        let covered = others
+            && point_flags::at(triangles, &above, p, rules)
+                .is_some_and(|(top, _)| top.height_m > seen_m);
         // A wall, seen edge-on, hides nothing by itself.
         if normal[2].abs() <= level {
             return [1, 0, 0, 0];

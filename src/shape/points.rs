@@ -266,7 +266,7 @@ pub fn discretize_surface(
         mark(&mut points, &probe, &found, progress)?;
         points.area_m2 = point_areas_m2(&points, &probe, progress)?;
     }
-    let hidden = Hidden::of(&surface).filter(|_| settings.marks);
+    let hidden = settings.marks.then(|| Hidden::of(&surface)).flatten();
     if let Some(share) = hidden
         .map(|hidden| hidden.of_upward)
         .filter(|s| *s > MOST_HIDDEN)

@@ -10,6 +10,7 @@ mod files;
 mod first_contact;
 mod help;
 mod interrupt;
+mod iron;
 mod lambda;
 mod messages;
 mod mistakes;

@@ -98,6 +98,7 @@ fn every_key_arrives_in_si() {
         mass_max_kg: Some(1.0),
         wire_length_max_m: Some(200.0),
         core_field_max_t: Some(1.6),
+        ..Limits::default()
     };
     assert_eq!(d.limits, limits);
     assert_eq!(d.target_height_m, 0.03);

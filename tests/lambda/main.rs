@@ -14,8 +14,10 @@ mod power;
 mod saturation;
 
 mod scale;
+mod two_fingers;
 mod uncertainty;
 mod vector_allocation;
 mod vector_feedback;
+mod vector_static;
 mod vertices;
 mod worst;

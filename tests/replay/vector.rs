@@ -5,14 +5,13 @@
 #![allow(clippy::print_stdout)]
 
 use fluxform::bundle::replay::Answer;
+use fluxform::commands::probe::{ProbeRequest, probe};
 use fluxform::commands::replay::renderer::{Renderer, Step};
 use fluxform::commands::replay::run;
 use fluxform::commands::replay::summary::TrajectorySource;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
-use fluxform::scene::Scene;
-use fluxform::scene::steel;
 use fluxform_testing::{Random, root};
 
 use crate::support::along_the_normal;
@@ -29,16 +28,19 @@ fn interpolated_vectors_are_those_of_the_field_within_the_stated_errors() {
     let text = std::fs::read_to_string(bundle.folder.join("design.toml")).unwrap();
     let path = root().join("designs/seed_air.toml");
     let (design, _) = Design::from_toml(&text, &path, Need::CALIBRATE).unwrap();
-    let scene = Scene::new(&design).unwrap();
     let mut random = Random::new(17);
     let places: Vec<[f64; 3]> = (0..1000)
         .map(|_| anywhere(&opened.renderer, &mut random))
         .collect();
-    let solved = steel::solve(&scene, scene.tolerances.forces, 0.01).unwrap();
-    let exact = scene
-        .force_vectors_n_per_a(&solved, &places, &Silent)
-        .unwrap();
-    let coils = scene.coils.len();
+    let request = ProbeRequest {
+        force: true,
+        ..ProbeRequest::default()
+    };
+    let table = probe(&design, places.clone(), request, &Silent).unwrap();
+    let exact: Vec<[f64; 3]> = (table.forces().iter())
+        .map(|[x, y, z, ..]| [*x, *y, *z])
+        .collect();
+    let coils = table.coils();
     let map = &bundle.manifest.map;
     let [x, y] = map.sides.as_ref().unwrap().largest_error;
     let stated = [x, y, map.interpolation.largest_error];

@@ -453,6 +453,7 @@ fn a_grids_marks_agree_with_its_heights() {
         },
         grid: GridRequest { x: axis, y: axis },
         weights: None,
+        direction_jnd_deg: fluxform_base::units::DIRECTION_JND_DEG,
         grid_is_given: true,
     };
     let settings = Settings {

@@ -63,6 +63,7 @@ fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> Sha
         placement,
         grid,
         weights: None,
+        direction_jnd_deg: fluxform_base::units::DIRECTION_JND_DEG,
         grid_is_given: true,
     }
 }

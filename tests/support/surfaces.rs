@@ -88,6 +88,7 @@ pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -
         placement,
         grid,
         weights: None,
+        direction_jnd_deg: fluxform_base::units::DIRECTION_JND_DEG,
         grid_is_given: true,
     }
 }

@@ -85,7 +85,7 @@ impl Owned {
         for entry in written {
             let path = target.join(&entry.path);
             let state = self
-                .state(folder, entry)
+                .state(folder, entry, overwrite.forced())
                 .map_err(|error| WriteError::from_io("look at", &path, error))?;
             match state {
                 State::Free => {}
@@ -114,7 +114,8 @@ impl Owned {
         Ok(())
     }
 
-    fn state(&self, folder: &Dir, entry: &FileEntry) -> io::Result<State> {
+    /// With `force` it is not looked whether a regular file is ours: it makes way either way.
+    fn state(&self, folder: &Dir, entry: &FileEntry, forced: bool) -> io::Result<State> {
         let mut dir = folder.clone();
         let mut parts = entry.path.split('/');
         let name = OsStr::new(parts.next_back().unwrap_or_default());
@@ -130,6 +131,9 @@ impl Owned {
         let Some(status) = dir.status(name)? else {
             return Ok(State::Free);
         };
+        if forced && status.kind == Kind::File && !self.reads(Some(status)) {
+            return Ok(State::Free);
+        }
         let same = status.kind == Kind::File
             && status.bytes == entry.bytes
             && digest(&dir, name)? == entry.sha256;

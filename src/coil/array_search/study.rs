@@ -404,8 +404,8 @@ impl View<'_, '_> {
             let physical = problem.estimate(sample.outputs.as_ref()?)?;
             let bounds = problem.bounds(&sample.x, Some(&physical));
             let met_but = TRADED.map(|(_, name)| {
-                let others = bounds.iter().filter(|bound| bound.name != Some(name));
-                others.fold(true, |met, bound| met && bound.excess() <= 0.0)
+                let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
+                others.all(|bound| bound.excess() <= 0.0)
             });
             let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
             let [Some(mass), Some(power), Some(settling)] = costs else {

@@ -109,7 +109,6 @@ fn one_coil_alone_is_the_best_coil_of_eq_11() {
         winding.field(0.0, 0.03).expect("in air").dbz_dz
     };
     let share = force(ours) / force(known);
-    println!("{share} {} {made:?}", found.evaluations);
     assert!(share > 1.0 - 1e-3, "{share} {made:?}");
 }
 

@@ -60,6 +60,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
         feedback: _,
         picture: _,
         force: _,
+        direction_jnd_deg: _,
         uncertainty: _,
     } = lambda;
     let Settings {

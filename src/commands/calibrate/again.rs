@@ -58,6 +58,7 @@ pub fn expected(
         circuit: &circuit,
         field: field.of_shape(&shape.document.name),
         shape,
+        checked: &[],
         options,
     };
     let search = calibration.search(progress)?;

@@ -54,6 +54,10 @@ impl IgnoredPull {
         if scene.design.magnet.passive_force || scene.core.is_none() {
             return Ok(None);
         }
+        if scene.iron.is_some() {
+            let why = "the pull of [plate] and [[iron]] on the magnet is not computed";
+            return Ok(Some(Self::Unknown(why.to_owned())));
+        }
         let forces_n = match field.pull_left_out_n(scene, &points.positions_m) {
             Ok(forces_n) => forces_n,
             Err(RunError::Interrupted(stop)) => return Err(stop.into()),

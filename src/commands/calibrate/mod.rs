@@ -52,7 +52,7 @@ mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
-mod requested_force;
+pub(crate) mod requested_force;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -134,6 +134,8 @@ impl CalibrateOptions {
             feedback: _,
             picture: _,
             force,
+            // Of `lambda --feedback` alone.
+            direction_jnd_deg: _,
             uncertainty,
         } = lambda;
         let Settings {
@@ -223,13 +225,15 @@ pub fn run(
     let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
-    for shape in shapes {
+    let check = |shape: &ShapeSource| -> Result<Vec<Input>, RunError> {
         let inputs = inputs(source, curve.as_ref(), shape);
         let inputs = discretize::with_surface(&shape.document, inputs);
         let made_with = options.made_with(shape);
         let folder = folder_of(&scene, shape, options);
         check_bundle_target(&folder, options.force, &inputs, Some(&made_with))?;
-    }
+        Ok(inputs)
+    };
+    let checked = shapes.iter().map(check).collect::<Result<Vec<_>, _>>()?;
     if !options.keep {
         store_of(&scene, options).clear();
     }
@@ -238,7 +242,8 @@ pub fn run(
     let circuit = Inductances::new(&scene, &solved.map, progress);
     let bundles = shapes
         .iter()
-        .map(|shape| {
+        .zip(&checked)
+        .map(|(shape, checked)| {
             Calibration {
                 scene: &scene,
                 solved: &solved,
@@ -247,6 +252,7 @@ pub fn run(
                 circuit: &circuit,
                 field: field.of_shape(&shape.document.name),
                 shape,
+                checked,
                 options,
             }
             .write(progress)
@@ -391,6 +397,8 @@ struct Calibration<'a> {
     circuit: &'a Inductances,
     field: ShapeField<'a>,
     shape: &'a ShapeSource,
+    /// The inputs with which the bundle was found to be replaceable.
+    checked: &'a [Input],
     options: &'a CalibrateOptions,
 }
 
@@ -407,10 +415,12 @@ impl Calibration<'_> {
             .as_ref()
             .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
         let points = self.points(document, progress)?;
-        // Checked again with the digest of the surface that was parsed.
+        // Checked again where the surface that was parsed is not the one that was looked at first.
         let made_with = options.made_with(self.shape);
         let inputs = &points.summary.inputs;
-        check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
+        if inputs != self.checked {
+            check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
+        }
         let write = |content: &BundleContent, lambda: &LambdaReport| {
             if let Some(message) = lambda.misplaced.as_ref().filter(|_| !options.force) {
                 let shape = &self.shape.document.name;

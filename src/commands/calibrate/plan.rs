@@ -373,7 +373,7 @@ fn finite_magnet(design: &Design, tolerance: Option<f64>, places: &[[f64; 3]]) -
 }
 
 fn coupling(design: &Design, tolerance: Option<f64>, places: &[[f64; 3]]) -> Option<Term> {
-    if design.array.positions_m.len() < 2 {
+    if design.array.positions_m.len() < 2 || design.has_iron() {
         return None;
     }
     let computed = coupled(design);

@@ -59,6 +59,9 @@ fn table() -> Option<&'static Recorded> {
 /// The curve for `scene`, `tolerance` marked; the same for the same scene, whatever this run took.
 /// `None` for a table without it.
 pub(super) fn curve(scene: &Scene, tolerance: f64) -> Option<ErrorTime<'static>> {
+    if scene.iron.is_some() {
+        return None;
+    }
     let name = match (&scene.core, coupled(scene.design)) {
         (None, _) => "map-table",
         (Some(_), false) => "cored-coil",

@@ -31,7 +31,7 @@ pub(super) fn summary(force: RequestedForce, points: &ConstraintPoints) -> Optio
 
 /// The request on the nodes of the points' grid, [y, x, 3]; `None` where the upward component alone
 /// is requested.
-pub(super) fn on_grid(force: RequestedForce, points: &ConstraintPoints) -> Option<Requested> {
+pub(crate) fn on_grid(force: RequestedForce, points: &ConstraintPoints) -> Option<Requested> {
     if !force.direction.is_vector() {
         return None;
     }

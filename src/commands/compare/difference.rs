@@ -7,30 +7,45 @@
 //! with w the just-noticeable relative difference and F_0 the smallest force that is felt at all.
 //! Symmetric in both; where one force vanishes and the other is strong, d = 1/w, the most there is.
 
+use crate::numerics::vec3::{dot, plus};
 use crate::units::DETECTION_THRESHOLD_N;
+
+fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
 
 /// A force, and the sum of its parts' sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Felt {
-    /// Upward, N.
-    pub force_n: f64,
-    /// The coils' forces, added without signs, N.
-    pub gross_n: f64,
+    /// Along x, y and z, N.
+    pub force_n: [f64; 3],
+    /// The coils' forces along each, added without signs, N.
+    pub gross_n: [f64; 3],
 }
 
 impl Felt {
     /// The force of `currents_a` for forces per ampere `row`, and without any current.
     #[must_use]
-    pub fn of(row: &[f64], currents_a: &[f64], passive_n: f64) -> Self {
-        let parts = row.iter().zip(currents_a).map(|(g, i)| g * i);
-        let start = Self {
-            force_n: passive_n,
-            gross_n: 0.0,
+    pub fn of(row: &[[f64; 3]], currents_a: &[f64], passive_n: f64) -> Self {
+        let mut felt = Self {
+            force_n: [0.0, 0.0, passive_n],
+            gross_n: [0.0; 3],
         };
-        parts.fold(start, |sum, part| Self {
-            force_n: sum.force_n + part,
-            gross_n: sum.gross_n + part.abs(),
-        })
+        for (per_ampere, current) in row.iter().zip(currents_a) {
+            let part = per_ampere.map(|force| force * current);
+            felt.force_n = plus(felt.force_n, part);
+            felt.gross_n = plus(felt.gross_n, part.map(f64::abs));
+        }
+        felt
+    }
+
+    /// Its upward part alone.
+    #[must_use]
+    pub fn upward(self) -> Self {
+        Self {
+            force_n: [0.0, 0.0, self.force_n[2]],
+            gross_n: [0.0, 0.0, self.gross_n[2]],
+        }
     }
 }
 
@@ -64,13 +79,13 @@ impl Difference {
     /// First-order error of the largest, where each coil's force is wrong by `part` of itself.
     #[must_use]
     pub fn error(&self, part: f64, jnd: f64) -> f64 {
-        part * (self.a.gross_n + self.b.gross_n) / scale_n(self.a, self.b, jnd)
+        part * (length(self.a.gross_n) + length(self.b.gross_n)) / scale_n(self.a, self.b, jnd)
     }
 }
 
 /// The difference that is just noticed, N.
 fn scale_n(a: Felt, b: Felt, jnd: f64) -> f64 {
-    (jnd * a.force_n.abs().max(b.force_n.abs())).max(DETECTION_THRESHOLD_N)
+    (jnd * length(a.force_n).max(length(b.force_n))).max(DETECTION_THRESHOLD_N)
 }
 
 /// Compares over the places of both surfaces, neither of them empty.
@@ -87,7 +102,8 @@ pub fn difference(surfaces: [Sides; 2], jnd: f64) -> Difference {
     for (surface, sides) in surfaces.into_iter().enumerate() {
         let (mut squares, mut felt) = (0.0, 0_usize);
         for (row, (&a, &b)) in sides.a.iter().zip(sides.b).enumerate() {
-            let d = (a.force_n - b.force_n).abs() / scale_n(a, b, jnd);
+            let apart: [f64; 3] = std::array::from_fn(|axis| a.force_n[axis] - b.force_n[axis]);
+            let d = length(apart) / scale_n(a, b, jnd);
             squares += d * d;
             felt += usize::from(d > 1.0);
             if d > found.largest {
@@ -110,7 +126,7 @@ mod tests {
     fn felt(forces: &[f64]) -> Vec<Felt> {
         forces
             .iter()
-            .map(|f| Felt::of(&[*f], &[1.0], 0.0))
+            .map(|f| Felt::of(&[[0.0, 0.0, *f]], &[1.0], 0.0))
             .collect()
     }
 
@@ -122,7 +138,7 @@ mod tests {
         let surfaces = [Sides { a: &a, b: &b }, Sides { a: &c, b: &d }];
         let found = difference(surfaces, 0.07);
         assert!((found.largest * 0.07 - 1.0).abs() < 1e-14);
-        assert_eq!((found.at, found.a.force_n), ((1, 0), 0.05));
+        assert_eq!((found.at, found.a.force_n[2]), ((1, 0), 0.05));
         let squares = 0.25 * ((1.0_f64 / 7.0).powi(2) + 1.5 * 1.5) + 0.5 / 0.0049;
         assert!((found.rms / squares.sqrt() - 1.0).abs() < 1e-14);
         assert_eq!(found.felt_share, 0.75);
@@ -131,8 +147,10 @@ mod tests {
 
     #[test]
     fn opposite_parts_cancel_in_the_force_and_not_in_its_error() {
-        let felt = Felt::of(&[0.7, -1.3], &[1.3, 0.7], 0.1);
-        assert!((felt.force_n - 0.1).abs() < 1e-15);
-        assert!((felt.gross_n - 1.82).abs() < 1e-15);
+        let rows = [[0.2, 0.0, 0.7], [0.0, 0.0, -1.3]];
+        let felt = Felt::of(&rows, &[1.3, 0.7], 0.1);
+        assert!((felt.force_n[2] - 0.1).abs() < 1e-15 && felt.force_n[0] == 0.26);
+        assert!((felt.gross_n[2] - 1.82).abs() < 1e-15 && felt.gross_n[0] == 0.26);
+        assert_eq!(felt.upward().force_n, [0.0, 0.0, felt.force_n[2]]);
     }
 }

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::calibrate::requested_force::on_grid;
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::proven_accuracy;
 use crate::RunError;
@@ -17,7 +18,11 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::rendering::HeightGrid;
 use crate::design::Design;
-use crate::lambda::{self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status};
+use crate::force_direction::RequestedForce;
+use crate::lambda::sideways::SIDEWAYS_WEIGHT;
+use crate::lambda::{
+    self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status, VectorAllocator,
+};
 use crate::plot::matrix::{MatrixPlot, Panel};
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -113,6 +118,14 @@ pub struct Pair {
     pub static_felt_share: Option<f64>,
     /// The same with position feedback.
     pub feedback_felt_share: Option<f64>,
+    /// Largest difference of all components with static currents, in just-noticeable differences.
+    pub static_vector_jnd: Option<f64>,
+    /// The same with position feedback.
+    pub feedback_vector_jnd: Option<f64>,
+    /// Root mean square of the differences of all components with static currents.
+    pub static_vector_rms_jnd: Option<f64>,
+    /// The same with position feedback.
+    pub feedback_vector_rms_jnd: Option<f64>,
     /// Where static currents differ most.
     pub static_at: Option<Place>,
     /// Where it is with position feedback.
@@ -134,6 +147,10 @@ pub struct Place {
     pub a_force_n: f64,
     /// Upward force of the second, N.
     pub b_force_n: f64,
+    /// Force of the first along x, y and z, N.
+    pub a_vector_n: [f64; 3],
+    /// Force of the second.
+    pub b_vector_n: [f64; 3],
 }
 
 /// An object made ready.
@@ -142,10 +159,19 @@ struct Object {
     positions_m: Vec<[f64; 3]>,
     heights: HeightGrid,
     /// N/A, [point, coil].
-    forces_n_per_a: Vec<f64>,
+    forces_n_per_a: Vec<[f64; 3]>,
+    /// The force vector requested, on the nodes of `heights`; `None`: upward.
+    direction: Option<Vec<f64>>,
     /// The force without currents, N.
     passive_n: Option<Vec<f64>>,
     rendered: Option<Rendered>,
+}
+
+/// Of the upward force, and of all components.
+#[derive(Clone)]
+struct Allocators {
+    upward: Allocator,
+    vector: VectorAllocator,
 }
 
 /// Force constant and static currents of an object.
@@ -173,13 +199,7 @@ pub fn run(
     options: &CompareOptions,
     progress: &dyn Progress,
 ) -> Result<CompareReport, RunError> {
-    for (i, shape) in shapes.iter().enumerate() {
-        let name = &shape.document.name;
-        if shapes[..i].iter().any(|other| other.document.name == *name) {
-            let message = format!("two shapes are called {name:?}: rename one");
-            return Err(RunError::Input(message));
-        }
-    }
+    check_names(shapes)?;
     let scene = Scene::with_tolerance(design, options.tolerance)?;
     let of_shapes = shapes.iter().filter_map(|shape| shape.input.clone());
     let inputs: Vec<Input> = std::iter::once(design_input.clone())
@@ -198,7 +218,18 @@ pub fn run(
     let mut warnings = Vec::new();
     let objects = points
         .into_iter()
-        .map(|points| Object::new(&scene, &solved, points, options, progress, &mut warnings))
+        .zip(shapes)
+        .map(|(points, shape)| {
+            let force = shape.document.force;
+            Object::new(
+                &scene,
+                &solved,
+                (points, force),
+                options,
+                progress,
+                &mut warnings,
+            )
+        })
         .collect::<Result<Vec<Object>, RunError>>()?;
     if let Some(core) = &scene.core {
         warnings.extend(core.warnings.iter().cloned());
@@ -240,11 +271,24 @@ pub fn run(
     })
 }
 
+/// # Errors
+/// Two shapes of one name.
+fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
+    for (i, shape) in shapes.iter().enumerate() {
+        let name = &shape.document.name;
+        if shapes[..i].iter().any(|other| other.document.name == *name) {
+            let message = format!("two shapes are called {name:?}: rename one");
+            return Err(RunError::Input(message));
+        }
+    }
+    Ok(())
+}
+
 impl Object {
     fn new(
         scene: &Scene,
         solved: &Solved,
-        points: PointsReport,
+        (points, force): (PointsReport, RequestedForce),
         options: &CompareOptions,
         progress: &dyn Progress,
         warnings: &mut Vec<String>,
@@ -256,7 +300,8 @@ impl Object {
         let heights = heights.ok_or_else(|| {
             RunError::Input("the shape's points do not fit their grid".to_owned())
         })?;
-        let forces = scene.forces_n_per_a(solved, &positions_m, progress)?;
+        let forces = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
+        let upward: Vec<f64> = forces.iter().map(|force| force[2]).collect();
         let passive_n = if scene.design.magnet.passive_force {
             passive::pull(scene, &positions_m, false)?.map(|pull| pull.forces_z_n(&positions_m))
         } else {
@@ -264,7 +309,7 @@ impl Object {
         };
         progress.begin("lambda", 1);
         let problem = ForceProblem {
-            forces_n_per_a: &forces,
+            forces_n_per_a: &upward,
             height_m: &found.height_m,
             offset_n: passive_n.as_deref(),
             weights: None,
@@ -286,6 +331,7 @@ impl Object {
         warnings.extend(all.map(|warning| format!("{name}: {warning}")));
         let rendered = Rendered::of(solution, options);
         Ok(Self {
+            direction: on_grid(force, found).map(|requested| requested.direction),
             rendered,
             positions_m,
             heights,
@@ -311,20 +357,34 @@ impl Object {
         }
     }
 
+    /// The force requested at a place over lambda, m; none beside the object.
+    fn requested(&self, place: &[f64; 3]) -> [f64; 3] {
+        let [x, y, _] = *place;
+        match &self.direction {
+            None => [0.0, 0.0, self.heights.height_m(x, y).unwrap_or(0.0)],
+            Some(direction) => {
+                let found = self.heights.height_and_direction(x, y, direction);
+                let (height, direction) = found.unwrap_or((0.0, [0.0; 3]));
+                direction.map(|part| height * part)
+            }
+        }
+    }
+
     /// The field of `other` at this object's places.
-    fn feels(&self, other: &Self, allocator: &Allocator) -> RenderedForces {
+    fn feels(&self, other: &Self, allocators: &Allocators) -> RenderedForces {
         let Some(rendered) = &other.rendered else {
             return RenderedForces::default();
         };
-        let coils = allocator.coils();
+        let coils = allocators.upward.coils();
         let portions: Vec<RenderedForces> = self
             .positions_m
             .par_chunks(PORTION)
             .zip(self.forces_n_per_a.par_chunks(PORTION * coils))
             .enumerate()
             .map(|(portion, (places, rows))| {
-                let mut allocator = allocator.clone();
+                let mut allocators = allocators.clone();
                 let mut currents = vec![0.0; coils];
+                let mut upward = vec![0.0; coils];
                 let mut field = RenderedForces::default();
                 for (k, (place, row)) in places.iter().zip(rows.chunks_exact(coils)).enumerate() {
                     let passive = self.passive_n.as_ref();
@@ -332,10 +392,23 @@ impl Object {
                     field
                         .fixed
                         .push(Felt::of(row, &rendered.currents_a, passive_n));
-                    let height_m = other.heights.height_m(place[0], place[1]).unwrap_or(0.0);
-                    let wanted_n = rendered.lambda_n_per_m * height_m - passive_n;
-                    let found = allocator.allocate(row, wanted_n, &mut currents);
-                    field.saturated += usize::from(found.reach == Reach::Saturated);
+                    let [x, y, wanted_n] = other
+                        .requested(place)
+                        .map(|part| rendered.lambda_n_per_m * part);
+                    let wanted_n = wanted_n - passive_n;
+                    let reach = if other.direction.is_some() {
+                        let wanted = [x, y, wanted_n];
+                        allocators.vector.allocate(row, wanted, &mut currents).reach
+                    } else {
+                        for (upward, force) in upward.iter_mut().zip(row) {
+                            *upward = force[2];
+                        }
+                        allocators
+                            .upward
+                            .allocate(&upward, wanted_n, &mut currents)
+                            .reach
+                    };
+                    field.saturated += usize::from(reach == Reach::Saturated);
                     field.feedback.push(Felt::of(row, &currents, passive_n));
                 }
                 field
@@ -395,15 +468,19 @@ fn fields(
 ) -> Result<Vec<Vec<RenderedForces>>, RunError> {
     let total_a = scene.design.supply.total_current_max_a;
     let ohm = scene.resistances_ohm();
-    let allocator = Allocator::new(&ohm, &scene.lower_a, &scene.upper_a, total_a)
-        .map_err(|fault| RunError::Input(fault.to_string()))?;
+    let (lower_a, upper_a) = (&scene.lower_a, &scene.upper_a);
+    let both = Allocator::new(&ohm, lower_a, upper_a, total_a).and_then(|upward| {
+        let vector = VectorAllocator::new(&ohm, lower_a, upper_a, total_a, SIDEWAYS_WEIGHT)?;
+        Ok(Allocators { upward, vector })
+    });
+    let allocators = both.map_err(|fault| RunError::Input(fault.to_string()))?;
     progress.begin("rendering", (objects.len() * objects.len()) as u64);
     let mut fields = Vec::with_capacity(objects.len());
     for surface in objects {
         let mut row = Vec::with_capacity(objects.len());
         for object in objects {
             progress.check()?;
-            row.push(surface.feels(object, &allocator));
+            row.push(surface.feels(object, &allocators));
             progress.advance(1);
         }
         fields.push(row);
@@ -424,29 +501,41 @@ fn pairs(
     for (i, a) in objects.iter().enumerate() {
         for (j, b) in objects.iter().enumerate().skip(i + 1) {
             let able = a.rendered.is_some() && b.rendered.is_some();
-            let both = |pick: fn(&RenderedForces) -> &[Felt]| {
-                let side = |surface: usize| Sides {
-                    a: pick(&fields[surface][i]),
-                    b: pick(&fields[surface][j]),
+            let both = |pick: fn(&RenderedForces) -> &[Felt], whole: bool| {
+                let of = |surface: usize, object: usize| -> Vec<Felt> {
+                    let felt = pick(&fields[surface][object]).iter().copied();
+                    felt.map(|one| if whole { one } else { one.upward() })
+                        .collect()
                 };
-                able.then(|| difference([side(i), side(j)], jnd))
+                able.then(|| {
+                    let [ii, ij, ji, jj] = [of(i, i), of(i, j), of(j, i), of(j, j)];
+                    difference([Sides { a: &ii, b: &ij }, Sides { a: &ji, b: &jj }], jnd)
+                })
             };
-            let fixed = both(|field| &field.fixed);
-            let feedback = both(|field| &field.feedback);
-            let place = |found: &Difference| {
+            let fixed = both(|field| &field.fixed, false);
+            let feedback = both(|field| &field.feedback, false);
+            let fixed_vector = both(|field| &field.fixed, true);
+            let feedback_vector = both(|field| &field.feedback, true);
+            let place = |(found, fields_of): (&Difference, fn(&RenderedForces) -> &[Felt])| {
                 let (surface, row) = found.at;
                 let object = [a, b][surface];
                 let [x_m, y_m, z_m] = object.positions_m[row];
+                let whole = |of: usize| fields_of(&fields[[i, j][surface]][of])[row].force_n;
                 Place {
                     on: object.name().to_owned(),
                     x_m,
                     y_m,
                     z_m,
-                    a_force_n: found.a.force_n,
-                    b_force_n: found.b.force_n,
+                    a_force_n: found.a.force_n[2],
+                    b_force_n: found.b.force_n[2],
+                    a_vector_n: whole(i),
+                    b_vector_n: whole(j),
                 }
             };
-            for found in [&fixed, &feedback].into_iter().flatten() {
+            for found in [&fixed, &feedback, &fixed_vector, &feedback_vector]
+                .into_iter()
+                .flatten()
+            {
                 error = error.max(found.error(part, jnd));
             }
             let of =
@@ -460,8 +549,16 @@ fn pairs(
                 feedback_rms_jnd: of(&feedback, |d| d.rms),
                 static_felt_share: of(&fixed, |d| d.felt_share),
                 feedback_felt_share: of(&feedback, |d| d.felt_share),
-                static_at: fixed.as_ref().map(place),
-                feedback_at: feedback.as_ref().map(place),
+                static_vector_jnd: of(&fixed_vector, |d| d.largest),
+                feedback_vector_jnd: of(&feedback_vector, |d| d.largest),
+                static_vector_rms_jnd: of(&fixed_vector, |d| d.rms),
+                feedback_vector_rms_jnd: of(&feedback_vector, |d| d.rms),
+                static_at: fixed
+                    .as_ref()
+                    .map(|found| place((found, |field| &field.fixed))),
+                feedback_at: feedback
+                    .as_ref()
+                    .map(|found| place((found, |field| &field.feedback))),
             });
         }
     }

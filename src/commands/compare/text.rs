@@ -44,7 +44,8 @@ fn object(shape: &ComparedShape) -> String {
 /// One line a pair.
 fn table_of(report: &CompareReport) -> String {
     let head = [
-        "", "", "static", "rms", "felt", "at mm", "feedback", "rms", "felt", "at mm",
+        "", "", "static", "rms", "felt", "vector", "at mm", "feedback", "rms", "felt", "vector",
+        "at mm",
     ];
     let none = || "none".to_owned();
     let number_or_none = |value: Option<f64>| value.map_or_else(none, |v| number_to(v, 4));
@@ -57,14 +58,16 @@ fn table_of(report: &CompareReport) -> String {
             number_or_none(pair.static_jnd),
             number_or_none(pair.static_rms_jnd),
             part(pair.static_felt_share),
+            number_or_none(pair.static_vector_jnd),
             at(pair.static_at.as_ref()),
             number_or_none(pair.feedback_jnd),
             number_or_none(pair.feedback_rms_jnd),
             part(pair.feedback_felt_share),
+            number_or_none(pair.feedback_vector_jnd),
             at(pair.feedback_at.as_ref()),
         ]
     }));
-    let mut sides = [Side::Right; 10];
+    let mut sides = [Side::Right; 12];
     sides[..2].fill(Side::Left);
     table(&sides, &rows)
 }

@@ -105,6 +105,7 @@ impl Inspected {
                     y: extent,
                 },
                 weights: None,
+                direction_jnd_deg: crate::units::DIRECTION_JND_DEG,
                 grid_is_given: true,
             },
             stated_m,

@@ -116,6 +116,11 @@ struct FeedbackFlags {
     #[arg(long, hide_short_help = true, value_name = "LENGTH", requires = "feedback",
           value_parser = values::length_with_unit, allow_hyphen_values = true)]
     shell: Option<f64>,
+    /// With --feedback: pairs of points under two fingers so far apart, like 50mm,80mm: where both get their
+    /// force
+    #[arg(long, hide_short_help = true, value_name = "FROM,TO", requires = "feedback",
+          value_parser = values::distances, allow_hyphen_values = true)]
+    two_fingers: Option<values::Ends>,
 }
 
 /// How the force constant is chosen.
@@ -129,6 +134,11 @@ pub struct CriterionFlags {
     #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,
+    /// Angle between forces that a finger just notices, like 25deg: how static currents for a force vector
+    /// weigh sideways errors [default: the shape file's `direction_jnd_deg`, or 25]
+    #[arg(long, hide_short_help = true, value_name = "ANGLE", value_parser = values::direction_jnd,
+          allow_hyphen_values = true)]
+    direction_jnd: Option<f64>,
     /// Report currents and errors at this force constant too, N/m
     #[arg(long, hide_short_help = true, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
@@ -146,6 +156,7 @@ impl CriterionFlags {
                 at_n_per_m: self.at,
             },
             tolerance,
+            direction_jnd_deg: self.direction_jnd,
             ..LambdaOptions::default()
         }
     }
@@ -168,6 +179,7 @@ impl Lambda {
             variants: self.wiring.variants,
             feedback: self.feedback.feedback.then_some(FeedbackOptions {
                 shell_m: self.feedback.shell,
+                two_fingers_m: self.feedback.two_fingers.map(|ends| ends.0),
             }),
             picture: self.plot.is_some(),
             force: self.requested.into(),

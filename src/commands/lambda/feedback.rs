@@ -8,13 +8,16 @@ use crate::bundle::lambda_file::{
 use crate::lambda::feedback::{
     Decided, FeedbackError, NoLambda, Rendered, Span, dip_between, reachable, render,
 };
+use crate::lambda::two_fingers::{TwoFingers, two_fingers};
 use crate::lambda::vector_feedback::{
     CurrentsOf, VectorProblem, reachable_vectors, render_vectors,
 };
+use crate::lambda::vector_static::{VectorStatic, sideways_weight, vector_static};
 use crate::lambda::{ForceProblem, OperatingPoint, Rewired};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::passive;
+use crate::units::DIRECTION_JND_DEG;
 
 use super::PosedProblem;
 
@@ -28,6 +31,8 @@ const MOST_LAYERS: f64 = 500.0;
 pub struct FeedbackOptions {
     /// How far above and below the surface the same demand is to be met, m (> 0).
     pub shell_m: Option<f64>,
+    /// Distances of two fingers whose pairs of points are looked at, m (>= 0, ascending).
+    pub two_fingers_m: Option<[f64; 2]>,
 }
 
 impl FeedbackOptions {
@@ -91,6 +96,7 @@ impl PosedProblem<'_> {
             at_chosen,
             at_largest: at_largest.transpose()?,
             shell,
+            two_fingers: self.two_fingers(options.two_fingers_m.zip(chosen), progress)?,
             vector: self.vector_feedback(chosen, progress)?,
         };
         Ok(WithFeedback {
@@ -241,15 +247,37 @@ impl Layers {
     }
 }
 
-/// The three components of an array's forces as wired, each [point, coil].
-fn wired_axes(posed: &PosedProblem, vectors: &[[f64; 3]]) -> [Rewired; 3] {
-    [0, 1, 2].map(|axis| {
-        let along: Vec<f64> = vectors.iter().map(|force| force[axis]).collect();
-        posed.options.wiring.apply(&ForceProblem {
-            forces_n_per_a: &along,
-            ..posed.unwired
-        })
-    })
+/// The three components of an array's forces as wired, each [point, coil], and the force requested.
+struct WiredVectors {
+    axes: [Rewired; 3],
+    direction: Vec<[f64; 3]>,
+}
+
+impl WiredVectors {
+    /// # Errors
+    /// Places that cannot be computed; interruption.
+    fn new(posed: &PosedProblem, progress: &dyn Progress) -> Result<Self, RunError> {
+        let positions = &posed.points.positions_m;
+        let vectors = (posed.scene).force_vectors_n_per_a(posed.solved, positions, progress)?;
+        let axes = [0, 1, 2].map(|axis| {
+            let along: Vec<f64> = vectors.iter().map(|force| force[axis]).collect();
+            posed.options.wiring.apply(&ForceProblem {
+                forces_n_per_a: &along,
+                ..posed.unwired
+            })
+        });
+        let direction = posed.points.directions(posed.force);
+        Ok(Self { axes, direction })
+    }
+
+    fn problem<'a>(&'a self, posed: &PosedProblem<'a>) -> VectorProblem<'a> {
+        let [of_x, of_y, of_z] = &self.axes;
+        VectorProblem {
+            upward: of_z.problem(&posed.unwired),
+            sides_n_per_a: [of_x, of_y].map(|side| side.problem(&posed.unwired).forces_n_per_a),
+            direction: &self.direction,
+        }
+    }
 }
 
 impl PosedProblem<'_> {
@@ -267,14 +295,8 @@ impl PosedProblem<'_> {
             return Ok(None);
         }
         let positions = &self.points.positions_m;
-        let vectors = (self.scene).force_vectors_n_per_a(self.solved, positions, progress)?;
-        let [of_x, of_y, of_z] = wired_axes(self, &vectors);
-        let direction = self.points.directions(force);
-        let problem = VectorProblem {
-            upward: of_z.problem(&self.unwired),
-            sides_n_per_a: [&of_x, &of_y].map(|side| side.problem(&self.unwired).forces_n_per_a),
-            direction: &direction,
-        };
+        let wired = WiredVectors::new(self, progress)?;
+        let problem = wired.problem(self);
         let mut span = Span::default();
         let reach = reachable_vectors(&problem).map_err(render_error)?;
         span.add(problem.upward.height_m, &reach);
@@ -300,10 +322,54 @@ impl PosedProblem<'_> {
                 position_m: positions[largest.point],
             }),
             fixed: at_chosen(|chosen| CurrentsOf::Static(&chosen.currents_a))?,
+            static_vector: Some(self.static_vector(&problem, chosen)?),
             upward: at_chosen(|_| CurrentsOf::Upward)?,
             vector: at_chosen(|_| CurrentsOf::Vector)?,
             at_largest: at_largest.transpose()?,
         }))
+    }
+}
+
+impl PosedProblem<'_> {
+    /// Pairs of points under two fingers, where they are requested and there is a force constant.
+    ///
+    /// # Errors
+    /// Places that cannot be computed; interruption.
+    fn two_fingers(
+        &self,
+        requested: Option<([f64; 2], &OperatingPoint)>,
+        progress: &dyn Progress,
+    ) -> Result<Option<TwoFingers>, RunError> {
+        let Some((apart_m, chosen)) = requested else {
+            return Ok(None);
+        };
+        let wired = WiredVectors::new(self, progress)?;
+        let found = two_fingers(
+            &wired.problem(self),
+            &self.points.positions_m,
+            self.scene.moment_a_m2,
+            chosen.lambda_n_per_m,
+            apart_m,
+        );
+        found.map(Some).map_err(render_error)
+    }
+
+    /// Static currents for all three components.
+    fn static_vector(
+        &self,
+        problem: &VectorProblem,
+        chosen: Option<&OperatingPoint>,
+    ) -> Result<VectorStatic, RunError> {
+        let (options, settings) = (self.options, &self.options.settings);
+        let noticed_deg = options.direction_jnd_deg.unwrap_or(DIRECTION_JND_DEG);
+        let weight = sideways_weight(settings.jnd_weight, noticed_deg);
+        let lambda = chosen.map(|chosen| chosen.lambda_n_per_m);
+        let mut found = vector_static(problem, weight, settings, lambda).map_err(render_error)?;
+        for of in found.own.iter_mut().chain(&mut found.at_chosen) {
+            options.wiring.spread(&mut of.currents_a);
+            options.wiring.spread(&mut of.worst.currents_a);
+        }
+        Ok(found)
     }
 }
 

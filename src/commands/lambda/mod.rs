@@ -78,6 +78,8 @@ pub struct LambdaOptions {
     pub picture: bool,
     /// What takes the place of the requested force that the shape states.
     pub force: ForceOverride,
+    /// What takes the place of the just-noticeable angle that the shape states, degrees.
+    pub direction_jnd_deg: Option<f64>,
     /// What takes the place of the design's uncertainties.
     pub uncertainty: UncertaintyOverride,
 }
@@ -117,6 +119,7 @@ impl LambdaOptions {
     fn over(&self, document: &ShapeDocument) -> Self {
         Self {
             force: self.force.over(document.force).into(),
+            direction_jnd_deg: self.direction_jnd_deg.or(Some(document.direction_jnd_deg)),
             ..self.clone()
         }
     }
@@ -475,6 +478,10 @@ impl PosedProblem<'_> {
 
     /// Warnings about the cores, at the chosen currents if there are any.
     fn core_warnings(&self, solution: &Solution) -> Result<Vec<String>, RunError> {
+        if let (Some(iron), Some(chosen)) = (&self.scene.iron, &solution.chosen) {
+            let peaks = iron.peaks(self.solved, &chosen.currents_a)?;
+            return Ok(iron.above_knee(self.scene, &peaks, "the chosen currents"));
+        }
         let Some(core) = &self.scene.core else {
             return Ok(Vec::new());
         };

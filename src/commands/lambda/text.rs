@@ -3,7 +3,8 @@
 use super::LambdaReport;
 use crate::bundle::lambda_file::{
     AtLambda, FeedbackFile, FeedbackPlace, FeedbackShell, LambdaFile, LambdaVariant,
-    TolerancePoint, VectorFeedbackFile, WorkingPointForces, WorstPointFile,
+    TolerancePoint, TwoFingers, VectorCurrents, VectorFeedbackFile, VectorStatic,
+    WorkingPointForces, WorstPointFile,
 };
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, headed_table};
@@ -139,6 +140,9 @@ fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
     if let Some(vector) = &file.vector {
         vector_lines(sheet, vector, file.at_chosen.as_ref());
     }
+    if let Some(of) = &file.two_fingers {
+        sheet.line("two fingers", &two_fingers(of));
+    }
     if let Some(shell) = &file.shell {
         sheet.line("shell", &shell_of(shell));
     }
@@ -170,6 +174,9 @@ fn vector_lines(sheet: &mut Sheet, file: &VectorFeedbackFile, at_chosen: Option<
             number_to(of.mean_power_w, 4)
         )
     };
+    if let Some(of) = &file.static_vector {
+        lines.extend(static_vector(of));
+    }
     let of_all = [
         ("static currents", &file.fixed),
         ("feedback of the upward part", &file.upward),
@@ -179,6 +186,56 @@ fn vector_lines(sheet: &mut Sheet, file: &VectorFeedbackFile, at_chosen: Option<
         lines.extend(of.iter().map(|of| one(&format!("{name}{at}"), of)));
     }
     sheet.line("vector", &lines.join("\n"));
+}
+
+/// Pairs of points under two fingers.
+fn two_fingers(of: &TwoFingers) -> String {
+    let [from, to] = of.apart_m.map(mm);
+    if of.pairs == 0 {
+        return format!("the object has no two points {from} to {to} apart");
+    }
+    format!(
+        "of {} {from} to {to} apart, at {} N/m: both get their upward force at {}, for {} W; their vector at {}, \
+         for {} W\nthe magnets push each other by {} at most, {} of the larger request",
+        count(of.pairs, "random pair"),
+        number(of.lambda_n_per_m),
+        percent(of.upward_share),
+        number_to(of.upward_power_w, 3),
+        percent(of.vector_share),
+        number_to(of.vector_power_w, 3),
+        force(of.magnets_force_n),
+        percent(of.magnets_force_share)
+    )
+}
+
+/// Static currents chosen for all three components.
+fn static_vector(file: &VectorStatic) -> Vec<String> {
+    let one = |of: &VectorCurrents| {
+        format!(
+            "static currents for the vector at {} N/m: off by a median of {} degrees; error {} of the request, \
+             sideways {}\n  weighted error rms {}, worst {}, no less than {}; {} W",
+            number(of.lambda_n_per_m),
+            number_to(of.rendering.direction_median_deg, 3),
+            percent(of.rendering.error_share),
+            percent(of.rendering.sideways_share),
+            force(of.weighted_rms_error_n),
+            force(of.worst.worst_error_n),
+            force(of.worst.at_least_n),
+            number_to(of.rendering.mean_power_w, 4)
+        )
+    };
+    let constants = file.constants.named().into_iter().filter_map(|constant| {
+        let lambda = constant.lambda_n_per_m?;
+        Some(format!("{} {}", constant.name, number(lambda)))
+    });
+    let constants: Vec<String> = constants.collect();
+    let first = format!(
+        "static currents for the vector, sideways errors counting {}: {} N/m",
+        percent(file.sideways_weight),
+        constants.join(", ")
+    );
+    let points = file.own.iter().chain(&file.at_chosen);
+    std::iter::once(first).chain(points.map(one)).collect()
 }
 
 fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlace>) -> String {

@@ -46,7 +46,7 @@ pub(super) fn make(
 ) -> Result<MultipolesMade, RunError> {
     let workspace = &scene.design.workspace;
     let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-    let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+    let top_m = scene.sources_top_m();
     if workspace.z_m.from <= top_m {
         return Err(RunError::Input(
             "--mpem needs a workspace above the top face of windings and cores, where its sources \
@@ -64,7 +64,7 @@ pub(super) fn make(
     }
 
     let axes_m: Vec<[f64; 2]> = scene.coils.iter().map(|c| c.axis_m).collect();
-    let coupled = solved.steel().coupled().is_some();
+    let coupled = solved.steel().couples();
     // Coils with common sources: all of them, or each for itself.
     let every: Vec<usize> = (0..axes_m.len()).collect();
     let groups: Vec<&[usize]> = if coupled {

@@ -37,7 +37,7 @@ const PARTS_OF_CELL: [f64; 3] = [0.0, 0.25, 0.5];
 pub(super) fn nodes(scene: &Scene, requested: Option<usize>) -> Result<[Axis; 3], RunError> {
     let workspace = &scene.design.workspace;
     let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-    let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+    let top_m = scene.sources_top_m();
     let most = axes.iter().map(|axis| axis.samples).max().unwrap_or(0);
     let count = requested.unwrap_or(most.clamp(FEWEST_NODES, MOST_DEFAULT_NODES));
     for (name, axis) in ["x", "y", "z"].iter().zip(&axes) {

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::array::command::{ArrayFlags, Shared};
+use super::array::command::{ArrayFlags, Shared, mark};
 use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
 use crate::RunError;
-use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
@@ -48,7 +47,7 @@ pub struct Optimize {
     wound: bool,
     /// Among the array's other coils: their unpowered cores count for force and settling of the
     /// coil nearest to the centre, where the design couples them
-    #[arg(long)]
+    #[arg(long, conflicts_with = "shapes")]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
     /// [default: 24; with --for 3]
@@ -58,7 +57,7 @@ pub struct Optimize {
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
-    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',')]
+    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
     fix: Vec<Key>,
     /// Boxes of coils that proving the best may take; 0 for no proof
     #[arg(
@@ -72,7 +71,7 @@ pub struct Optimize {
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
     /// Write a page with the result here (HTML); `-` is standard output
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "shapes")]
     report: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
@@ -223,13 +222,4 @@ impl Optimize {
             }
         }
     }
-}
-
-/// The line by which a design that was made of this one is known from any other file.
-pub(super) fn mark(design: &FileArgument, text: &str) -> String {
-    format!(
-        "# Made of {} (sha256 {}) by `fluxform optimize`.",
-        design.as_given().display(),
-        sha256_hex(text.as_bytes())
-    )
 }

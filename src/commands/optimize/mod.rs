@@ -29,6 +29,7 @@ use crate::coil::optimum::{
 };
 use crate::design::Design;
 use crate::progress::{Progress, Silent};
+use crate::scene::iron::without_iron;
 use crate::scene::rated::Rated;
 use crate::scene::steel;
 use crate::scene::{Scene, coupled};
@@ -102,6 +103,7 @@ pub fn optimize(
     progress: &dyn Progress,
 ) -> Result<Optimization, RunError> {
     let design = document.design;
+    without_iron(design, "optimize")?;
     let fixed = fixed(design, &request.fixed)?;
     // Before the search, which takes long: a design whose own coil is at fault is found at once.
     let given = design

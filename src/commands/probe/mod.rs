@@ -208,15 +208,16 @@ struct Group {
 /// array and magnet.
 fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Group>, RunError> {
     let core = scene.core.as_ref();
-    let top_m = core.map_or(0.0, |core| core.shape.top_m.max(0.0));
+    let top_m = scene.sources_top_m();
     let unit_m = CLOSEST * core.map_or(scene.winding.inner_radius_m, |core| core.shape.radius_m);
     let depth_m = scene.magnet_depth_m();
     let step = |length_m: f64| (length_m / unit_m).log2().floor();
     let mut groups = BTreeMap::new();
     for (row, point) in points_m.iter().enumerate() {
-        let distance_m = match core {
-            Some(core) => clearance_of_m(scene, core, row + 1, *point, 0.0)?,
-            None => unit_m,
+        let distance_m = if scene.steel_extent_m().is_some() {
+            clearance_of_m(scene, row + 1, *point, 0.0)?
+        } else {
+            unit_m
         };
         let near = step(distance_m).max(0.0);
         let gap_m = point[2] - top_m - depth_m;
@@ -267,9 +268,9 @@ impl<'a> FieldAt<'a> {
     ) -> Result<Self, RunError> {
         let reach_m = rule.map_or(0.0, MagnetRule::reach_m);
         let amplification = rule.map_or(1.0, MagnetRule::amplification);
-        if let Some(core) = &scene.core {
+        if solved.has_steel() {
             for row in &group.rows {
-                clearance_of_m(scene, core, row + 1, points_m[*row], reach_m)?;
+                clearance_of_m(scene, row + 1, points_m[*row], reach_m)?;
             }
         }
         Ok(Self {

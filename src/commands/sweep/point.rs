@@ -10,6 +10,7 @@ use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::progress::Silent;
 use crate::scene::Scene;
+use crate::scene::iron::without_iron;
 use crate::scene::rated::{CircuitSummary, Rated};
 
 /// A plan made ready for computing its points.
@@ -122,6 +123,7 @@ fn optimum(result: &Optimization) -> Computed {
 }
 
 fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
+    without_iron(design, "sweep")?;
     let rated = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
     let row = Row {
         current_a: rated.target.current_a,

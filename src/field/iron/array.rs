@@ -97,16 +97,13 @@ impl IronArray {
     /// # Errors
     /// A node on a winding's edge.
     pub fn at_resolution(
-        Coils {
-            winding,
-            positions_m,
-            ..
-        }: Coils<'_>,
+        coils: Coils<'_>,
         iron: &Iron,
         tolerance: f64,
         tier: usize,
     ) -> Result<Self, OnEdge> {
         let resolution = iron.resolution(RESOLUTIONS[tier]);
+        let positions_m = coils.positions_m;
         let surface = Surface::new(iron.part(), &resolution);
         let images = iron.images();
         let planes_m = iron.planes_m;
@@ -121,32 +118,8 @@ impl IronArray {
                     }
             })
             .collect();
-        let node_at = |image: usize, node: &Node| mirrored(node, images[image], planes_m);
-        // The windings' potential at every node of every image.
-        let potentials: Vec<DMatrix<f64>> = (0..images.len())
-            .map(|image| {
-                let columns: Vec<f64> = firsts
-                    .iter()
-                    .flat_map(|drive| {
-                        let [x, y] = positions_m[*drive];
-                        let of_node = |(number, node): (usize, &Node)| {
-                            let [px, py, pz] = node_at(image, node).place_m;
-                            let bore = surface.face_of(number).bore;
-                            let in_bore = bore.is_some_and(|own| {
-                                moved(positions_m, own, images[image], planes_m) == *drive
-                            });
-                            winding.potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
-                        };
-                        surface
-                            .nodes
-                            .par_iter()
-                            .enumerate()
-                            .map(of_node)
-                            .collect::<Vec<f64>>()
-                    })
-                    .collect();
-                DMatrix::from_vec(surface.size(), firsts.len(), columns)
-            })
+        let potentials: Vec<DMatrix<f64>> = (images.iter())
+            .map(|signs| potentials(&surface, coils, &firsts, *signs, planes_m))
             .collect();
         let solved = system.solve(&potentials, SOLVER_SHARE * tolerance);
         // Every drive from the first of its like.
@@ -167,7 +140,7 @@ impl IronArray {
             .collect();
         let mut array = Self {
             positions_m: positions_m.to_vec(),
-            winding,
+            winding: coils.winding,
             surface,
             images,
             planes_m,
@@ -285,16 +258,28 @@ impl IronArray {
     /// # Errors
     /// A place on a winding's edge.
     pub fn field_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
+        self.field_of(place_m, currents_a, &self.layers_at(currents_a))
+    }
+
+    /// The layer of every image at these currents, A.
+    fn layers_at(&self, currents_a: &[f64]) -> Vec<Vec<f64>> {
+        let sum = |row: &[f64]| row.iter().zip(currents_a).map(|(v, i)| v * i).sum();
+        let of_image = |layers: &Vec<f64>| layers.chunks_exact(currents_a.len()).map(sum).collect();
+        self.layers.iter().map(of_image).collect()
+    }
+
+    fn field_of(
+        &self,
+        place_m: Point,
+        currents_a: &[f64],
+        layers: &[Vec<f64>],
+    ) -> Result<Point, OnEdge> {
         let mut sum = [0.0; 3];
-        for (image, layers) in self.layers.iter().enumerate() {
-            let values: Vec<f64> = (layers.chunks_exact(currents_a.len()))
-                .map(|row| row.iter().zip(currents_a).map(|(v, i)| v * i).sum())
-                .collect();
-            let [sx, sy] = self.images[image];
+        for ([sx, sy], values) in self.images.iter().zip(layers) {
             let [cx, cy] = self.planes_m;
             let [x, y, z] = place_m;
             let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            let [bx, by, bz] = self.surface.field_t(own, &values);
+            let [bx, by, bz] = self.surface.field_t(own, values);
             sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
         }
         for ([x, y], current) in self.positions_m.iter().zip(currents_a) {
@@ -339,6 +324,37 @@ impl ArraySteel for IronArray {
     fn coupled(&self) -> Option<&CoupledArray> {
         None
     }
+
+    fn iron(&self) -> Option<&IronArray> {
+        Some(self)
+    }
+}
+
+/// The potential of the windings `firsts` at every node of one mirrored copy, [node, winding].
+fn potentials(
+    surface: &Surface,
+    coils: Coils<'_>,
+    firsts: &[usize],
+    signs: [f64; 2],
+    planes_m: [f64; 2],
+) -> DMatrix<f64> {
+    let positions_m = coils.positions_m;
+    let of_winding = |drive: &usize| {
+        let [x, y] = positions_m[*drive];
+        let of_node = |(number, node): (usize, &Node)| {
+            let [px, py, pz] = mirrored(node, signs, planes_m).place_m;
+            let bore = surface.face_of(number).bore;
+            let in_bore =
+                bore.is_some_and(|own| moved(positions_m, own, signs, planes_m) == *drive);
+            coils
+                .winding
+                .potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
+        };
+        let nodes = surface.nodes.par_iter().enumerate();
+        nodes.map(of_node).collect::<Vec<f64>>()
+    };
+    let columns: Vec<f64> = firsts.iter().flat_map(of_winding).collect();
+    DMatrix::from_vec(surface.size(), firsts.len(), columns)
 }
 
 /// A drive as the mirror image of the first of its like.
@@ -388,51 +404,76 @@ fn moved(positions_m: &[[f64; 2]], drive: usize, [sx, sy]: [f64; 2], [cx, cy]: [
     place.expect("only what the windings share is a mirror")
 }
 
-/// Whether a place is within `least_m` of any of `nodes`.
-fn close(place_m: Point, nodes: &[Node], least_m: f64) -> bool {
-    nodes
-        .iter()
-        .any(|node| norm(minus(place_m, node.place_m)) < least_m)
+fn apart(a: Point, b: Point) -> f64 {
+    norm(minus(a, b))
+}
+
+/// The largest |B| of every part of the steel, T, with their places, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IronPeaks {
+    /// In the core of every coil; empty without cores.
+    pub cores: Vec<(f64, Point)>,
+    /// In the rest.
+    pub elsewhere: (f64, Point),
 }
 
 impl IronArray {
-    /// Largest |B| with `currents_a` at least `depth_m` inside the steel's surface, T, and where, m.
+    /// The largest |B| with `currents_a` at least `depth_m` inside the steel's surface.
     ///
     /// # Errors
     /// A place on a winding's edge.
-    pub fn peak_t(&self, currents_a: &[f64], depth_m: f64) -> Result<(f64, Point), OnEdge> {
-        let nodes: Vec<Node> = (self.images.iter())
-            .flat_map(|image| {
-                let nodes = self.surface.nodes.iter();
-                nodes.map(|node| mirrored(node, *image, self.planes_m))
-            })
-            .collect();
-        let mut places: Vec<Point> = nodes
+    pub fn peaks(&self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
+        let mut nodes: Vec<(Node, Option<usize>)> = Vec::new();
+        for image in &self.images {
+            nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
+                let of = |core| moved(&self.positions_m, core, *image, self.planes_m);
+                let core = self.surface.face_of(number).bore.map(of);
+                (mirrored(node, *image, self.planes_m), core)
+            }));
+        }
+        let inside: Vec<(Point, Option<usize>)> = nodes
             .par_iter()
-            .filter_map(|node| {
+            .filter_map(|(node, core)| {
                 let area = norm(node.area_m2);
-                let place =
+                let place: Point =
                     std::array::from_fn(|i| node.place_m[i] - depth_m * node.area_m2[i] / area);
-                (!close(place, &nodes, 0.98 * depth_m)).then_some(place)
+                let far = |(other, _): &(Node, _)| apart(place, other.place_m) >= 0.98 * depth_m;
+                nodes.iter().all(far).then_some((place, *core))
             })
             .collect();
-        let mut sparse: Vec<Point> = Vec::new();
-        for place in places.drain(..) {
-            if !sparse
+        let mut sparse: Vec<(Point, Option<usize>)> = Vec::new();
+        for (place, core) in inside {
+            if sparse
                 .iter()
-                .any(|other| norm(minus(place, *other)) < 0.5 * depth_m)
+                .all(|(other, _)| apart(place, *other) >= 0.5 * depth_m)
             {
-                sparse.push(place);
+                sparse.push((place, core));
             }
         }
-        let peaks = sparse
+        let layers = self.layers_at(currents_a);
+        let values = sparse
             .par_iter()
-            .map(|place| Ok((norm(self.field_t(*place, currents_a)?), *place)))
+            .map(|(place, _)| Ok(norm(self.field_of(*place, currents_a, &layers)?)))
             .collect::<Result<Vec<_>, OnEdge>>()?;
-        Ok(peaks.into_iter().fold(
-            (0.0, [0.0; 3]),
-            |most, one| if one.0 > most.0 { one } else { most },
-        ))
+        let cores = if nodes.iter().any(|(_, core)| core.is_some()) {
+            currents_a.len()
+        } else {
+            0
+        };
+        let mut peaks = IronPeaks {
+            cores: vec![(0.0, [0.0; 3]); cores],
+            elsewhere: (0.0, [0.0; 3]),
+        };
+        for ((place, core), value) in sparse.into_iter().zip(values) {
+            let most = match core {
+                Some(core) => &mut peaks.cores[core],
+                None => &mut peaks.elsewhere,
+            };
+            if value > most.0 {
+                *most = (value, place);
+            }
+        }
+        Ok(peaks)
     }
 }
 

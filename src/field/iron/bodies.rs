@@ -28,6 +28,86 @@ pub enum Outline {
     Round(f64),
 }
 
+/// A body's shape about its middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Solid {
+    /// Sides along x, y and z, m.
+    Box(Point),
+    /// About z: inner and outer radius and length, m; a full cylinder where the first is 0.
+    Tube([f64; 3]),
+    /// Radius, m.
+    Ball(f64),
+}
+
+/// A body somewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Its shape.
+    pub solid: Solid,
+    /// Its middle, m.
+    pub centre_m: Point,
+    /// The matrix that turns it.
+    pub turn: [Point; 3],
+}
+
+/// No rotation.
+pub const UPRIGHT: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+impl Body {
+    /// Distance of a place from its surface, m; below nothing inside.
+    #[must_use]
+    pub fn distance_m(&self, place_m: Point) -> f64 {
+        let d = minus(place_m, self.centre_m);
+        let [x, y, z]: Point =
+            std::array::from_fn(|i| (0..3).map(|row| self.turn[row][i] * d[row]).sum());
+        let outside = |parts: &[f64]| {
+            let beyond = parts.iter().map(|p| p.max(0.0).powi(2)).sum::<f64>().sqrt();
+            let within = parts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if within > 0.0 { beyond } else { within }
+        };
+        match self.solid {
+            Solid::Box([a, b, c]) => {
+                outside(&[x.abs() - 0.5 * a, y.abs() - 0.5 * b, z.abs() - 0.5 * c])
+            }
+            Solid::Tube([inner, outer, length]) => {
+                let r = x.hypot(y);
+                let bore = if inner > 0.0 {
+                    inner - r
+                } else {
+                    f64::NEG_INFINITY
+                };
+                outside(&[bore.max(r - outer), z.abs() - 0.5 * length])
+            }
+            Solid::Ball(radius) => dot(d, d).sqrt() - radius,
+        }
+    }
+
+    /// Its surface.
+    #[must_use]
+    pub fn faces(&self) -> Vec<Face> {
+        let faces = match self.solid {
+            Solid::Box(sides) => cuboid(sides),
+            Solid::Tube([inner, outer, length]) => tube(inner, outer, length),
+            Solid::Ball(radius) => Face::ball([0.0; 3], [radius; 3]),
+        };
+        let turn = |p: Point| self.turn.map(|row| dot(row, p));
+        let moved = |face: Face| face.moved(turn, self.centre_m);
+        faces.into_iter().map(moved).collect()
+    }
+
+    /// Places spread over its surface, m.
+    pub fn places_m(&self) -> impl Iterator<Item = Point> + use<> {
+        const STEPS: usize = 16;
+        self.faces().into_iter().flat_map(|face| {
+            (0..=STEPS * (STEPS + 2)).map(move |k| {
+                let (u, v) = (k / (STEPS + 1), k % (STEPS + 1));
+                face.point(u as f64 / STEPS as f64, v as f64 / STEPS as f64)
+                    .0
+            })
+        })
+    }
+}
+
 /// A level plate of steel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plate {
@@ -44,6 +124,20 @@ pub struct Plate {
 }
 
 impl Plate {
+    /// The plate as a body.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        let [x, y] = self.centre_m;
+        Body {
+            solid: match self.outline {
+                Outline::Rectangle([a, b]) => Solid::Box([a, b, self.thickness_m]),
+                Outline::Round(diameter) => Solid::Tube([0.0, 0.5 * diameter, self.thickness_m]),
+            },
+            centre_m: [x, y, self.top_m - 0.5 * self.thickness_m],
+            turn: UPRIGHT,
+        }
+    }
+
     fn contains(&self, [x, y]: [f64; 2], margin_m: f64) -> bool {
         let (x, y) = (x - self.centre_m[0], y - self.centre_m[1]);
         match self.outline {

@@ -269,9 +269,28 @@ impl Surface {
             let digits = (1.0 / tolerance).ln() / (ratio + ratio.hypot(1.0)).ln();
             (digits.ceil() as usize + 1).clamp(2, MOST_DIPOLES)
         });
-        let coarse = part.nodes(face, orders);
+        let moments = self.moments(part, orders, panels, drives, values);
+        for node in part.nodes(face, orders) {
+            let area = norm(node.area_m2);
+            let [nx, ny, nz] = node.area_m2.map(|n| n / area);
+            let [x, y, z] = node.place_m;
+            out.0.push([x, y, z, nx, ny, nz]);
+        }
+        out.1.extend(moments);
+    }
+
+    /// Moments at the nodes of a part of a face, [node][drive], that act from afar as the layers on it do.
+    fn moments(
+        &self,
+        part: &Panel,
+        orders: [usize; 2],
+        panels: std::ops::Range<usize>,
+        drives: usize,
+        values: &[f64],
+    ) -> Vec<f64> {
+        let face = &self.faces[part.face];
         let [first, second] = orders.map(|order| Basis::new(gauss::rule(order)));
-        let mut moments = vec![0.0; coarse.len() * drives];
+        let mut moments = vec![0.0; orders[0] * orders[1] * drives];
         let (mut wu, mut wv) = (vec![0.0; orders[0]], vec![0.0; orders[1]]);
         let own = self.order * self.order;
         let (mut ou, mut ov) = (vec![0.0; self.order], vec![0.0; self.order]);
@@ -324,13 +343,7 @@ impl Surface {
                 }
             }
         }
-        for node in coarse {
-            let area = norm(node.area_m2);
-            let [nx, ny, nz] = node.area_m2.map(|n| n / area);
-            let [x, y, z] = node.place_m;
-            out.0.push([x, y, z, nx, ny, nz]);
-        }
-        out.1.extend(moments);
+        moments
     }
 }
 

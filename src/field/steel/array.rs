@@ -9,6 +9,8 @@
 //!
 //! q_own being the driven coil's own core under its own winding, solved on the fine outline.
 //! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
+//! A few cores exchange potentials on their whole grids; many only what passes between them (see
+//! [`super::reduced_coupling`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -17,9 +19,10 @@ use nalgebra::{DMatrix, DVector};
 use super::CoreShape;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
-use super::equivalent_dipoles::{ArraySources, Near};
+use super::equivalent_dipoles::{ArraySources, Near, spread_over};
 use super::exchange::{Grading, LEAST_GAP, PART, side_panels};
 use super::generatrix::{Generatrix, Resolution};
+use super::reduced_coupling::{OneCore, Received, ReducedCoupling};
 use super::response::{Response, Rings};
 use super::symmetry::{Motion, motions};
 use crate::components::Components;
@@ -32,6 +35,11 @@ const MOST_MODES: usize = 17;
 /// about half their radius ask for more, and the stated error grows.
 const MOST_UNKNOWNS: usize = 3500;
 const MOST_ENTRIES: usize = 300_000_000;
+/// Cores up to which whole grids are exchanged: of more, only what passes between them.
+const MOST_WHOLE: usize = 16;
+/// Share of the tolerance that each part may have which is left out of what passes: a few hundredths
+/// of it is what they come to.
+const PASSED_SHARE: f64 = 0.2;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.01;
 
@@ -156,8 +164,8 @@ pub struct CoupledArray {
     pub response: Response,
     /// Layer of mode 0 of a driven coil's own core under its own winding, A/A, on the nodes.
     pub own_layer: DVector<f64>,
-    /// Potential sent to every core by all others, [drive][core][exchange grid], A/A.
-    pub potentials: Vec<Vec<Vec<f64>>>,
+    /// Potential sent to every core by all others, A/A.
+    potentials: Potentials,
     /// Steel's part of self and mutual inductances, [coil, drive], H.
     pub added_inductance_h: DMatrix<f64>,
     /// Estimated error: of the gradients above, relative to the largest |grad B| at the height,
@@ -170,6 +178,14 @@ pub struct CoupledArray {
     pub iterations: usize,
 }
 
+/// What every core receives for one ampere in each coil.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+enum Potentials {
+    /// [drive][core][exchange grid].
+    Whole(Vec<Vec<Vec<f64>>>),
+    Reduced(Received),
+}
+
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MOST_REFINEMENTS: usize = 4;
 /// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
@@ -180,6 +196,10 @@ const CLOSEST: f64 = 0.1;
 const NEAR: f64 = 0.5;
 /// Modes that each refinement adds where places close to the cores are requested.
 const MODES_NEAR: usize = 2;
+/// Drives of many coils of which two resolutions are compared, at most, and the distance of the coils
+/// about which, in the smallest of two.
+const MOST_COMPARED: usize = 8;
+const BESIDE: f64 = 1.6;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
 
@@ -200,7 +220,7 @@ impl CoupledArray {
         lowest_m: f64,
     ) -> Result<Self, OnEdge> {
         let closest_m = closest_m(positions_m);
-        let offsets = different_offsets(positions_m);
+        let offsets = grids_at_once(positions_m);
         let top_m = shape.top_m.max(0.0);
         let lowest_m = lowest_m.max(top_m + CLOSEST * shape.radius_m);
         let near = lowest_m < top_m + NEAR * shape.radius_m;
@@ -249,22 +269,26 @@ impl CoupledArray {
 
     fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
         let shape = self.response.outline.shape;
-        let drives = self.positions_m.len();
+        let (drives, about) = self.compared();
         let distance_m = lowest_m - shape.top_m;
-        let sources =
-            |array: &Self| ArraySources::of_array(array, lowest_m, distance_m, 0.05 * tolerance);
+        let near = (lowest_m, distance_m, 0.05 * tolerance);
+        let sources = |array: &Self| {
+            if drives.len() == array.positions_m.len() {
+                ArraySources::of_coils(array, near, false)
+            } else {
+                ArraySources::of_drives(array, &drives, near, false)
+            }
+        };
         let (fine, coarse) = (sources(self), sources(other));
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
         for height in [0.0, 1.0, 4.0] {
             let z_m = lowest_m + height * shape.radius_m;
             let reach = self.winding.outer_radius_m;
-            let points: Vec<[f64; 3]> = self
-                .positions_m
-                .iter()
+            let points: Vec<[f64; 3]> = (about.iter())
                 .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
                 .collect();
-            let mut values = vec![0.0; drives * parts.count() * points.len()];
+            let mut values = vec![0.0; drives.len() * parts.count() * points.len()];
             let mut others = values.clone();
             fine.sample(&points, parts, &mut values);
             coarse.sample(&points, parts, &mut others);
@@ -284,6 +308,25 @@ impl CoupledArray {
         Ok(worst.max((added - &other.added_inductance_h).amax() / size))
     }
 
+    /// Drives of which two resolutions are compared, and axes about which: of a few coils all, of many
+    /// some that are not equivalent, and their neighbours.
+    fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
+        let all = &self.positions_m;
+        if all.len() <= MOST_WHOLE {
+            return ((0..all.len()).collect(), all.clone());
+        }
+        let first = representatives(all.len(), &motions(all));
+        let chosen = spread_over(first.len(), MOST_COMPARED);
+        let drives: Vec<usize> = chosen.into_iter().map(|k| first[k]).collect();
+        let reach_m = BESIDE * closest_m(all);
+        let beside = |[x, y]: &&[f64; 2]| {
+            let apart = |drive: &usize| (all[*drive][0] - x).hypot(all[*drive][1] - y);
+            drives.iter().any(|drive| apart(drive) <= reach_m)
+        };
+        let about = all.iter().filter(beside).copied().collect();
+        (drives, about)
+    }
+
     /// Solves at one resolution.
     ///
     /// Domain: cores apart by more than nothing, windings apart or touching.
@@ -297,6 +340,28 @@ impl CoupledArray {
         positions_m: &[[f64; 2]],
         resolution: &ArrayResolution,
     ) -> Result<Self, OnEdge> {
+        let (mut array, excitation) = Self::uncoupled(
+            winding,
+            shape,
+            relative_permeability,
+            positions_m,
+            resolution,
+        )?;
+        if positions_m.len() > MOST_WHOLE {
+            array.couple_reduced(&excitation, resolution);
+        } else {
+            array.couple(&excitation, resolution);
+        }
+        Ok(array)
+    }
+
+    fn uncoupled(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        positions_m: &[[f64; 2]],
+        resolution: &ArrayResolution,
+    ) -> Result<(Self, Excitation), OnEdge> {
         let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
         let excitation = Excitation::new(winding, &outline, resolution.outline.quadrature)?;
         let exchange = Rings::graded(
@@ -313,19 +378,18 @@ impl CoupledArray {
             resolution.outline.quadrature,
         );
         let own_layer = response.axial_layer(&excitation.potential);
-        let mut array = Self {
+        let array = Self {
             positions_m: positions_m.to_vec(),
             winding: *winding,
             response,
             own_layer,
-            potentials: Vec::new(),
+            potentials: Potentials::Whole(Vec::new()),
             added_inductance_h: DMatrix::zeros(positions_m.len(), positions_m.len()),
             relative_error: f64::NAN,
             relative_residual: 0.0,
             iterations: 0,
         };
-        array.couple(&excitation, resolution);
-        Ok(array)
+        Ok((array, excitation))
     }
 
     fn couple(&mut self, excitation: &Excitation, resolution: &ArrayResolution) {
@@ -397,7 +461,32 @@ impl CoupledArray {
                 self.added_inductance_h[(coil, drive)] = flux;
             }
         }
-        self.potentials = all.into_iter().map(|(p, _)| p).collect();
+        self.potentials = Potentials::Whole(all.into_iter().map(|(p, _)| p).collect());
+    }
+
+    fn couple_reduced(&mut self, excitation: &Excitation, resolution: &ArrayResolution) {
+        let cores = self.positions_m.len();
+        let symmetries = motions(&self.positions_m);
+        let weights = excitation.flux_weights_wb_per_a(&self.response.outline);
+        let core = OneCore {
+            response: &self.response,
+            winding: &self.winding,
+            own_moments: self.response.on_grid(&self.own_layer),
+            flux_by_ring: self.response.layers[0].tr_mul(&weights),
+        };
+        let closest_m = closest_m(&self.positions_m);
+        let cut = PASSED_SHARE / SOLVER_SHARE * resolution.residual;
+        let coupling = ReducedCoupling::new(&core, &self.positions_m, closest_m, cut);
+        let first = representatives(cores, &symmetries);
+        let solved = coupling.solve(&core, &symmetries, &first, resolution.residual);
+        self.added_inductance_h = solved.inductance_h;
+        let own_flux = weights.dot(&self.own_layer);
+        for coil in 0..cores {
+            self.added_inductance_h[(coil, coil)] += own_flux;
+        }
+        self.relative_residual = solved.relative_residual;
+        self.iterations = solved.iterations;
+        self.potentials = Potentials::Reduced(solved.received);
     }
 
     fn moved(&self, motion: &Motion, values: &[f64]) -> Vec<f64> {
@@ -410,11 +499,36 @@ impl CoupledArray {
         out
     }
 
+    /// Azimuthal modes, as [`Response::modes_of`] has them, of what one core receives with currents in
+    /// the coils, A.
+    pub(super) fn modes_at(&self, core: usize, currents_a: &[f64]) -> DMatrix<f64> {
+        match &self.potentials {
+            Potentials::Whole(potentials) => {
+                let mut potential = vec![0.0; self.response.size()];
+                for (drive, current) in potentials.iter().zip(currents_a) {
+                    for (sum, value) in potential.iter_mut().zip(&drive[core]) {
+                        *sum += current * value;
+                    }
+                }
+                self.response.modes_of(&potential)
+            }
+            Potentials::Reduced(received) => {
+                let currents = currents_a.iter().copied().enumerate();
+                received.modes(currents, core, &self.response)
+            }
+        }
+    }
+
     /// Layers of one core for one driven coil, on the nodes: column 0 for mode 0, then cosine
     /// and sine of every mode, A/A.
     #[must_use]
     pub fn layers(&self, drive: usize, core: usize) -> DMatrix<f64> {
-        let modes = self.response.modes_of(&self.potentials[drive][core]);
+        let modes = match &self.potentials {
+            Potentials::Whole(potentials) => self.response.modes_of(&potentials[drive][core]),
+            Potentials::Reduced(received) => {
+                received.modes(std::iter::once((drive, 1.0)), core, &self.response)
+            }
+        };
         let mut layers = self.response.layers_of(&modes);
         if drive == core {
             layers.column_mut(0).axpy(1.0, &self.own_layer, 1.0);
@@ -428,7 +542,7 @@ impl ArraySources {
     /// to a relative error `tolerance`.
     #[must_use]
     pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
-        Self::near(array, lowest_m, distance_m, tolerance, false)
+        Self::of_coils(array, (lowest_m, distance_m, tolerance), false)
     }
 
     /// The same for many points: as few dipoles as a comparison with those of
@@ -440,14 +554,19 @@ impl ArraySources {
         distance_m: f64,
         tolerance: f64,
     ) -> Self {
-        Self::near(array, lowest_m, distance_m, tolerance, true)
+        Self::of_coils(array, (lowest_m, distance_m, tolerance), true)
     }
 
-    fn near(
+    fn of_coils(array: &CoupledArray, near: (f64, f64, f64), many: bool) -> Self {
+        let drives: Vec<usize> = (0..array.positions_m.len()).collect();
+        Self::of_drives(array, &drives, near, many).driven_by_coils(&array.positions_m)
+    }
+
+    /// Dipoles for some of the drives.
+    fn of_drives(
         array: &CoupledArray,
-        lowest_m: f64,
-        distance_m: f64,
-        tolerance: f64,
+        drives: &[usize],
+        (lowest_m, distance_m, tolerance): (f64, f64, f64),
         many: bool,
     ) -> Self {
         let response = &array.response;
@@ -455,8 +574,8 @@ impl ArraySources {
             &response.outline,
             &array.positions_m,
             response.layers.len(),
-            array.positions_m.len(),
-            |drive, core| array.layers(drive, core),
+            drives.len(),
+            |drive, core| array.layers(drives[drive], core),
             Near {
                 lowest_m,
                 distance_m,
@@ -465,7 +584,16 @@ impl ArraySources {
                 winding: &array.winding,
             },
         )
-        .driven_by_coils(&array.positions_m)
+    }
+}
+
+/// Matrices of whole exchange grids that are there at once: one for every different offset of a few
+/// cores, none of many.
+pub(super) fn grids_at_once(positions_m: &[[f64; 2]]) -> usize {
+    if positions_m.len() > MOST_WHOLE {
+        0
+    } else {
+        different_offsets(positions_m)
     }
 }
 
@@ -508,6 +636,75 @@ mod tests {
             assert!((resolution.panel_m - 1.5 * (0.02 - 0.014)).abs() < 1e-12);
             let error = 3_f64.powi(-2 * i32::try_from(resolution.order).unwrap());
             assert!(error < 0.1 * tolerance, "{tolerance:e}: {error:e}");
+        }
+    }
+
+    /// Lattices, whole and with holes, and scattered cores: solved by what passes between them they are
+    /// what whole grids give.
+    #[test]
+    fn what_passes_between_cores_gives_what_whole_grids_give() {
+        let winding = Winding {
+            inner_radius_m: 0.013,
+            outer_radius_m: 0.019,
+            length_m: 0.07,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.011,
+            bottom_m: -0.083,
+            top_m: 0.003,
+        };
+        let rows = |columns: usize, [dx, dy]: [f64; 2], shift: f64| -> Vec<[f64; 2]> {
+            (0..3 * columns)
+                .map(|i| {
+                    let (row, column) = ((i / columns) as f64, (i % columns) as f64);
+                    [0.007 + dx * (column + shift * (row % 2.0)), dy * row]
+                })
+                .collect()
+        };
+        let mut holed = rows(4, [0.043, 0.043], 0.0);
+        holed.swap_remove(5);
+        let scattered = vec![
+            [0.0, 0.0],
+            [0.053, 0.007],
+            [-0.031, 0.049],
+            [0.022, -0.061],
+            [0.21, 0.1],
+        ];
+        for positions_m in [
+            rows(3, [0.047, 0.051], 0.0),
+            rows(2, [0.044, 0.044 * 0.75_f64.sqrt()], 0.5),
+            rows(4, [0.043, 0.043], 0.0),
+            holed,
+            scattered,
+        ] {
+            for tolerance in [1e-3, 1e-5] {
+                let resolution =
+                    ArrayResolution::for_tolerance(tolerance, shape, closest_m(&positions_m));
+                let uncoupled =
+                    CoupledArray::uncoupled(&winding, shape, 470.0, &positions_m, &resolution);
+                let (array, excitation) = uncoupled.unwrap();
+                let (mut whole, mut reduced) = (array.clone(), array);
+                whole.couple(&excitation, &resolution);
+                reduced.couple_reduced(&excitation, &resolution);
+                let [a, b] = [&whole, &reduced].map(|array| &array.added_inductance_h);
+                let inductance = (a - b).amax() / a.amax();
+                let cores = positions_m.len();
+                let (mut layer, mut size) = (0.0_f64, 0.0_f64);
+                for (drive, core) in (0..cores * cores).map(|i| (i / cores, i % cores)) {
+                    let [a, b] = [&whole, &reduced].map(|array| array.layers(drive, core));
+                    layer = layer.max((&a - b).amax());
+                    size = size.max(a.amax());
+                }
+                assert!(
+                    inductance < 0.1 * tolerance,
+                    "{cores} {tolerance:e}: {inductance:e}"
+                );
+                assert!(
+                    layer < 0.1 * tolerance * size,
+                    "{cores} {tolerance:e}: {layer:e} {size:e}"
+                );
+            }
         }
     }
 

@@ -1,8 +1,9 @@
 //! Cost of solving an array of coupled cores, from its shape alone.
 
 use super::CoreShape;
-use super::array::{ArrayResolution, representatives};
+use super::array::{ArrayResolution, grids_at_once, representatives};
 use super::coupling::different_offsets;
+use super::reduced_coupling::is_lattice;
 use super::symmetry::motions;
 
 /// Cores of which offsets and symmetries are counted; of more, bounds are used.
@@ -17,6 +18,14 @@ const NUMBER_BYTES: f64 = 8.0;
 const SENT: f64 = 0.022;
 /// Matrices of the pull's coupling that are there at once.
 const PULL_MATRICES: f64 = 5.0;
+/// Coefficients that pass between many cores, as a share of a core's unknowns: 0.3 to 0.45 for cores 4 to 5
+/// radii apart.
+const PASSED: f64 = 0.4;
+/// Steps of a lattice's periodic plane for every core, and matrices of each that are there at once.
+const LATTICE_STEPS: f64 = 4.0;
+const LATTICE_MATRICES: f64 = 2.0;
+/// Drives that are solved together.
+const TOGETHER: f64 = 32.0;
 /// Operations of factoring and solving for all columns, in cubes of the size.
 const PULL_CUBES: f64 = 8.0 / 3.0;
 /// Bytes of a pair of cores in the table of offsets.
@@ -49,9 +58,9 @@ impl ArrayCost {
         let cores = positions_m.len();
         let (offsets, drives) = if cores <= COUNTED {
             let drives = representatives(cores, &motions(positions_m)).len();
-            (different_offsets(positions_m), drives)
+            (grids_at_once(positions_m), drives)
         } else {
-            (cores, cores.div_ceil(8))
+            (0, cores.div_ceil(8))
         };
         let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m).within_memory(
             shape,
@@ -60,6 +69,26 @@ impl ArrayCost {
         );
         let size = resolution.unknowns(shape, winding_length_m) as f64;
         let (cores, offsets, drives) = (cores as f64, offsets as f64, drives as f64);
+        let least_error = 2.0 * resolution.exchange_error(shape, closest_m);
+        if offsets == 0.0 && cores > 1.0 {
+            let block = (PASSED * size).powi(2);
+            // Offsets of a lattice, of which every eighth is computed, or half of all pairs.
+            let (products, different) = if is_lattice(positions_m) {
+                (LATTICE_STEPS * cores, 0.5 * cores)
+            } else {
+                (cores * cores, 0.5 * cores * cores)
+            };
+            let vectors = (STEPS + 4.0) * drives.min(TOGETHER) * cores * PASSED * size;
+            let passed = different * block + LATTICE_MATRICES * LATTICE_STEPS * cores * block;
+            let solved = SOLUTIONS * cores * drives * PASSED * size;
+            return Self {
+                bytes: NUMBER_BYTES * (passed + vectors + solved),
+                operations: SOLUTIONS
+                    * (STEPS * 4.0 * products * block * drives
+                        + different * size * (10.0 * size + 2.0 * PASSED * size)),
+                least_error,
+            };
+        }
         let matrices = (offsets + 1.0) * size * size;
         let potentials = SOLUTIONS * cores * cores * size;
         let steps = (STEPS + 4.0) * drives * cores * size;
@@ -67,7 +96,7 @@ impl ArrayCost {
             bytes: NUMBER_BYTES * (matrices + potentials + steps) + PAIR_BYTES * cores * cores,
             operations: SOLUTIONS
                 * (STEPS * 2.0 * size * size * cores * cores * drives + 10.0 * matrices),
-            least_error: 2.0 * resolution.exchange_error(shape, closest_m),
+            least_error,
         }
     }
 

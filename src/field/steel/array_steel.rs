@@ -10,6 +10,7 @@ use super::array::CoupledArray;
 use super::axial_table::AxialTable;
 use super::equivalent_dipoles::ArraySources;
 use super::magnetized::MagnetizedCore;
+use crate::iron::array::IronArray;
 use crate::source::AxialSource;
 use crate::winding::{AxialField, OnEdge, Winding};
 
@@ -40,6 +41,16 @@ pub trait ArraySteel {
 
     /// Cores that magnetise each other, which only together have |B| inside.
     fn coupled(&self) -> Option<&CoupledArray>;
+
+    /// Whether steel answers to other windings than its own.
+    fn couples(&self) -> bool {
+        self.coupled().is_some() || self.iron().is_some()
+    }
+
+    /// Steel of any shape.
+    fn iron(&self) -> Option<&IronArray> {
+        None
+    }
 }
 
 /// Field and gradient per ampere at a radius and a height, m.

@@ -119,7 +119,9 @@ impl AxialTable {
         assert_eq!(r_m.len(), z_m.len(), "one height per radius");
         let mut out = vec![Vec::with_capacity(r_m.len()); requested.len()];
         let mut last: Option<(Key, Arc<Cell>)> = None;
-        let mut room = [0.0; MOST_TERMS];
+        // The series in the radius at the height of the point before, [quantity][degree], in its cell.
+        let mut rows = vec![[0.0; MOST_TERMS]; requested.len()];
+        let mut rows_of: Option<(Key, f64)> = None;
         for (r, z) in r_m.iter().zip(z_m) {
             let Some(place) = self.place(*r, *z) else {
                 let field = self.exact(*r, *z)?;
@@ -132,15 +134,21 @@ impl AxialTable {
                 Some((key, cell)) if *key == place.key => cell,
                 Some(_) | None => &last.insert((place.key, self.cell(place.key))).1,
             };
-            let (along_r, along_z) = (polynomials(place.x), polynomials(place.y));
-            let rows = &mut room[..self.terms];
-            for (values, quantity) in out.iter_mut().zip(requested) {
-                values.push(dispatch::run(Series {
-                    coefficients: self.series(place.key, cell, *quantity)?,
-                    along_r: &along_r[..self.terms],
-                    along_z: &along_z[..self.terms],
-                    rows,
-                }));
+            if rows_of != Some((place.key, place.y)) {
+                let along_z = polynomials(place.y);
+                for (row, quantity) in rows.iter_mut().zip(requested) {
+                    dispatch::run(Row {
+                        coefficients: self.series(place.key, cell, *quantity)?,
+                        along_z: &along_z[..self.terms],
+                        row: &mut row[..self.terms],
+                    });
+                }
+                rows_of = Some((place.key, place.y));
+            }
+            let along_r = polynomials(place.x);
+            for (values, row) in out.iter_mut().zip(&rows) {
+                let terms = row.iter().zip(&along_r).take(self.terms);
+                values.push(terms.map(|(a, b)| a * b).sum());
             }
         }
         Ok(out)
@@ -358,25 +366,24 @@ impl AxialTable {
     }
 }
 
-/// A product of two Chebyshev series at a point.
-struct Series<'a> {
+/// A product of two Chebyshev series at one height: a series in the radius.
+struct Row<'a> {
     /// [degree in z][degree in r]
     coefficients: &'a [f64],
-    along_r: &'a [f64],
     along_z: &'a [f64],
-    /// Room for one number per degree in r.
-    rows: &'a mut [f64],
+    /// One number per degree in r.
+    row: &'a mut [f64],
 }
 
-impl Kernel for Series<'_> {
-    type Output = f64;
+impl Kernel for Row<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<const FMA: bool>(self) -> f64 {
-        self.rows.fill(0.0);
-        let by_row = self.coefficients.chunks_exact(self.along_r.len());
+    fn run<const FMA: bool>(self) {
+        self.row.fill(0.0);
+        let by_row = self.coefficients.chunks_exact(self.row.len());
         for (row, factor) in by_row.zip(self.along_z) {
-            for (sum, coefficient) in self.rows.iter_mut().zip(row) {
+            for (sum, coefficient) in self.row.iter_mut().zip(row) {
                 *sum = if FMA {
                     factor.mul_add(*coefficient, *sum)
                 } else {
@@ -384,7 +391,6 @@ impl Kernel for Series<'_> {
                 };
             }
         }
-        self.rows.iter().zip(self.along_r).map(|(a, b)| a * b).sum()
     }
 }
 

@@ -45,13 +45,24 @@ const DEEPEST: f64 = 0.25;
 /// The same where the peak was found: close to the surface the kernels exceed what their sum
 /// gives by radius over depth.
 const PEAK_QUADRATURE: f64 = 1e-11;
-/// The volume's rule: nodes of this outline's side times nodes of its bottom.
+/// The volume's rule: nodes of this outline's side times nodes of its bottom; its order is that for a
+/// solution of no stated error.
 const VOLUME: Resolution = Resolution {
     order: 4,
     ratio: 0.2,
     tip: 0.2,
     quadrature: QUADRATURE,
 };
+/// The volume's order where the solution errs by `relative_error`: each node more gains about a digit.
+fn volume_order(relative_error: f64) -> usize {
+    let digits = -relative_error.clamp(1e-9, 1e-4).log10();
+    if digits.is_nan() {
+        VOLUME.order
+    } else {
+        VOLUME.order + (digits - 4.0).ceil() as usize
+    }
+}
+
 /// Closest to the axis that is evaluated, in radii; the field is even there.
 const AXIS: f64 = 1e-3;
 
@@ -118,7 +129,8 @@ impl CoredCoil {
         } else {
             LOST_ALONE
         };
-        let field = core_fields(outline, &self.winding, &[core], depth_m, lost_counts)?[0];
+        let order = volume_order(self.relative_error);
+        let field = core_fields(outline, &self.winding, &[core], depth_m, lost_counts, order)?[0];
         // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
         let differs = match &self.coarser {
             Some(coarser) => {
@@ -213,7 +225,7 @@ impl CoupledArray {
     pub fn core_fields(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
         let cores = self.cores(&Incident::new(self), currents_a);
         let (outline, winding) = (&self.response.outline, &self.winding);
-        let fields = core_fields(outline, winding, &cores, depth_m, LOST_ALONE)?;
+        let fields = core_fields(outline, winding, &cores, depth_m, LOST_ALONE, VOLUME.order)?;
         Ok(fields
             .into_iter()
             .map(|field| CoreField {
@@ -247,15 +259,7 @@ impl CoupledArray {
     fn cores(&self, incident: &Incident, currents_a: &[f64]) -> Vec<Core> {
         let count = self.positions_m.len();
         let modes: Vec<DMatrix<f64>> = (0..count)
-            .map(|core| {
-                let mut potential = vec![0.0; self.response.size()];
-                for (drive, current) in self.potentials.iter().zip(currents_a) {
-                    for (sum, value) in potential.iter_mut().zip(&drive[core]) {
-                        *sum += current * value;
-                    }
-                }
-                self.response.modes_of(&potential)
-            })
+            .map(|core| self.modes_at(core, currents_a))
             .collect();
         let sent = incident.layers(&self.response.exchange.to_nodes, &modes);
         modes
@@ -403,6 +407,7 @@ fn core_fields(
     cores: &[Core],
     depth_m: f64,
     lost_counts: f64,
+    order: usize,
 ) -> Result<Vec<CoreField>, OnEdge> {
     let shape = outline.shape;
     let depth_m = allowed_depth_m(shape, depth_m);
@@ -415,8 +420,8 @@ fn core_fields(
 
     let modes = full.first().map_or(1, |l| l.ncols().div_ceil(2));
     let curve = scan_curve(winding, shape, depth_m, SCAN_ORDER);
-    let fine = Volume::new(winding, shape, VOLUME.order);
-    let coarse = Volume::new(winding, shape, VOLUME.order - 1);
+    let fine = Volume::new(winding, shape, order);
+    let coarse = Volume::new(winding, shape, order - 1);
     let mut targets = places(&curve);
     let first_fine = targets.len();
     targets.extend(&fine.points);

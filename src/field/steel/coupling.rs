@@ -305,7 +305,7 @@ pub(super) fn integrate_stretched(
 ///
 /// Outside its bore the winding is two charged discs: it has the field of the magnetisation
 /// M_z(r) = J (a2 - max(r, a1)) between its faces.
-fn from_winding(
+pub(super) fn from_winding(
     winding: &Winding,
     points: &[([f64; 3], [f64; 3])],
     offset_m: [f64; 2],

@@ -350,7 +350,7 @@ impl DipoleTask<'_> {
 }
 
 /// At most `most` of `count` indices, from the first to the last.
-fn spread_over(count: usize, most: usize) -> Vec<usize> {
+pub(super) fn spread_over(count: usize, most: usize) -> Vec<usize> {
     let chosen = count.min(most);
     (0..chosen)
         .map(|k| k * (count - 1) / (chosen - 1).max(1))

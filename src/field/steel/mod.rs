@@ -22,6 +22,7 @@ pub mod magnetized;
 pub mod passive;
 mod peak_search;
 pub mod permeability;
+mod reduced_coupling;
 pub mod response;
 pub mod saturated;
 pub mod saturated_array;

@@ -293,6 +293,11 @@ impl Response {
         layer
     }
 
+    /// Moments on the rings for potentials on the rings, of azimuthal number `mode`.
+    pub(super) fn ring_moments(&self, mode: usize) -> &DMatrix<f64> {
+        &self.moments[mode]
+    }
+
     /// The core's moments for potentials on the exchange grid: a dense block-circulant matrix,
     /// index = angle * rings + ring.
     #[must_use]

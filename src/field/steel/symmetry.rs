@@ -1,12 +1,13 @@
 //! Quarter turns and mirrors that map an array of identical coils to itself.
 
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 use crate::components::Components;
 
 /// A motion of the plane that maps the array to itself: a mirror theta -> -theta first, if
 /// `mirrored`, then quarter turns, both about the array's centre.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Motion {
     /// Where each coil goes.
     pub coil: Vec<usize>,
@@ -37,6 +38,23 @@ impl Motion {
             _ => [-y, x],
         };
         [x, if self.mirrored { -y } else { y }]
+    }
+
+    /// Cosine and sine of azimuthal number `mode` in the image of its cosine, or of its sine.
+    #[must_use]
+    pub fn wave(&self, mode: usize, sine: bool) -> [f64; 2] {
+        // Of the mode's phase after the quarter turns.
+        let (cos, sin) = match (mode * self.quarters) % 4 {
+            0 => (1.0, 0.0),
+            1 => (0.0, 1.0),
+            2 => (-1.0, 0.0),
+            _ => (0.0, -1.0),
+        };
+        match (sine, self.mirrored) {
+            (false, _) => [cos, sin],
+            (true, false) => [-sin, cos],
+            (true, true) => [sin, -cos],
+        }
     }
 
     /// Where the k-th of `angles` (a multiple of four) regular angles about a coil's axis goes.

@@ -27,7 +27,7 @@ pub struct ErrorForm {
 }
 
 impl ErrorForm {
-    pub(super) fn new(coils: usize) -> Self {
+    pub(crate) fn new(coils: usize) -> Self {
         Self {
             coils,
             hessian: vec![0.0; coils * (coils + 1) / 2],
@@ -38,7 +38,7 @@ impl ErrorForm {
 
     /// Adds `square` times the mean square of `row . I`, each current being off by a share of which
     /// `driver_square` is the mean square.
-    pub(super) fn add_square(&mut self, row: &[f64], square: f64, driver_square: f64) {
+    pub(crate) fn add_square(&mut self, row: &[f64], square: f64, driver_square: f64) {
         let mut at = 0;
         for (i, a) in row.iter().enumerate() {
             for (sum, b) in self.hessian[at..=at + i].iter_mut().zip(row) {
@@ -50,7 +50,7 @@ impl ErrorForm {
     }
 
     /// Adds `weight` times the cross term of `row . I` and the force `wanted_n`, and that force's square.
-    pub(super) fn add_target(&mut self, row: &[f64], wanted_n: f64, mean: f64, weight: f64) {
+    pub(crate) fn add_target(&mut self, row: &[f64], wanted_n: f64, mean: f64, weight: f64) {
         for (sum, a) in self.linear.iter_mut().zip(row) {
             *sum += weight * mean * wanted_n * a;
         }
@@ -58,7 +58,7 @@ impl ErrorForm {
     }
 
     /// Adds `share` times another.
-    pub(super) fn add(&mut self, other: &Self, share: f64) {
+    pub(crate) fn add(&mut self, other: &Self, share: f64) {
         let pairs = self.hessian.iter_mut().zip(&other.hessian);
         let pairs = pairs.chain(self.linear.iter_mut().zip(&other.linear));
         for (sum, value) in pairs {
@@ -68,7 +68,7 @@ impl ErrorForm {
     }
 
     /// The mean square error of currents, N^2.
-    pub(super) fn value(&self, currents_a: &[f64]) -> f64 {
+    pub(crate) fn value(&self, currents_a: &[f64]) -> f64 {
         let mut sum = self.constant;
         for (i, current) in currents_a.iter().enumerate() {
             let row = &self.hessian[i * (i + 1) / 2..];
@@ -81,7 +81,7 @@ impl ErrorForm {
 
     /// Leaves in `currents_a` those of the least sum of error and `price_n2_per_w` (> 0) times power, from
     /// those within the limits that are there.
-    pub(super) fn minimise(
+    pub(crate) fn minimise(
         &self,
         limits: &ForceProblem,
         price_n2_per_w: f64,

@@ -161,36 +161,26 @@ impl Slopes {
         low: &[f64],
         high: &[f64],
     ) -> Self {
-        let mut columns = Vec::with_capacity(free.len());
-        for &i in free {
+        let here = of(u);
+        let mut objectives = DMatrix::zeros(here.objectives.len(), free.len());
+        let mut limits = DMatrix::zeros(here.limits.len(), free.len());
+        for (column, &i) in free.iter().enumerate() {
             let mut at = u.to_vec();
             let ends = [(u[i] - STEP).max(low[i]), (u[i] + STEP).min(high[i])];
             let [below, above] = ends.map(|end| {
                 at[i] = end;
                 of(&at)
             });
-            let width = ends[1] - ends[0];
-            let difference = |a: &[f64], b: &[f64]| -> Vec<f64> {
-                let slope = |(a, b): (&f64, &f64)| (b - a) / width;
-                let finite = |s: f64| if s.is_finite() { s } else { 0.0 };
-                a.iter().zip(b).map(slope).map(finite).collect()
+            let set = |slopes: &mut DMatrix<f64>, a: &[f64], b: &[f64]| {
+                for (row, (a, b)) in a.iter().zip(b).enumerate() {
+                    let slope = (b - a) / (ends[1] - ends[0]);
+                    slopes[(row, column)] = if slope.is_finite() { slope } else { 0.0 };
+                }
             };
-            columns.push((
-                difference(&below.objectives, &above.objectives),
-                difference(&below.limits, &above.limits),
-            ));
+            set(&mut objectives, &below.objectives, &above.objectives);
+            set(&mut limits, &below.limits, &above.limits);
         }
-        let count =
-            |of: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| columns.first().map_or(0, |c| of(c).len());
-        let matrix = |of: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
-            DMatrix::from_fn(count(of), columns.len(), |row, column| {
-                of(&columns[column])[row]
-            })
-        };
-        Self {
-            objectives: matrix(|c| &c.0),
-            limits: matrix(|c| &c.1),
-        }
+        Self { objectives, limits }
     }
 
     /// The step of the quadratic model, whose variables are the move, the objective's change and the

@@ -1,22 +1,10 @@
 //! Whole variables: branching below the relaxed optimum.
 
 use super::descent::{Ended, Judged, climb};
-use super::{Box, Values, Variable, WHOLE};
+use super::variable::{Region, Values, Variable, WHOLE};
 
 /// Local searches that one climb may take.
 const MOST: usize = 48;
-
-/// The allowed value nearest to `x`.
-pub fn nearest_value(variable: &Variable, x: f64) -> f64 {
-    let [below, above] = variable.neighbours(x);
-    let near = if x - below <= above - x { below } else { above };
-    near.clamp(variable.low, variable.high)
-}
-
-/// The same in units.
-pub fn nearest(variable: &Variable, u: f64) -> f64 {
-    variable.unit(nearest_value(variable, variable.value(u)))
-}
 
 /// The best place of a box, whole variables whole; `None` where the box holds no whole value.
 ///
@@ -26,7 +14,7 @@ pub fn climb_whole(
     variables: &[Variable],
     of: &dyn Fn(&[f64]) -> Judged,
     from: &[f64],
-    region: &Box,
+    region: &Region,
 ) -> Option<Ended> {
     let mut open = vec![(region.clone(), from.to_vec())];
     let mut best: Option<Ended> = None;

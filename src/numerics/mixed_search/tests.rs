@@ -1,6 +1,8 @@
 //! The search on problems whose optimum is known.
 
+use super::descent::Judged;
 use super::*;
+use fluxform_base::progress::Interrupted;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A problem from closures.
@@ -36,8 +38,7 @@ fn variable(low: f64, high: f64, values: Values) -> Variable {
 
 /// A coil-like problem: strength falls with the bore and grows with turns, limits on resistance and
 /// time bind; layers, turns and wire are whole, so is the optimum found by trying all of them.
-fn coil()
--> Closed<impl Fn(&[f64]) -> Option<Vec<f64>> + Sync, impl Fn(&[f64], &[f64]) -> Judged + Sync> {
+fn coil() -> impl Problem {
     let wires = vec![0.5, 0.6, 0.7, 0.9];
     Closed {
         variables: vec![
@@ -124,13 +125,7 @@ fn a_coil_like_problem_comes_to_the_best_of_all_whole_values() {
         search
             .run(&[vec![24.0, 10.0, 100.0, 0.7, 10.0]])
             .expect("not interrupted");
-        let (sample, judged) = search.best().expect("a design");
-        println!(
-            "{seed}: {} {:?} {} of {known}",
-            search.samples().len(),
-            sample.x,
-            judged.objective()
-        );
+        let (_, judged) = search.best().expect("a design");
         assert!(judged.excess() <= MET);
         assert!(
             judged.objective() > known - 2e-3,
@@ -209,4 +204,35 @@ fn contradicting_limits_give_the_design_that_breaks_them_least() {
     search.run(&[]).expect("not interrupted");
     let (sample, judged) = search.best().expect("a design");
     assert!((judged.excess() - 0.2).abs() < 1e-3, "{sample:?}");
+}
+
+/// The user stops it: what was evaluated is there.
+#[test]
+fn what_was_evaluated_before_an_interruption_is_kept() {
+    struct Stopped(Vec<Variable>, AtomicUsize);
+    impl Problem for Stopped {
+        fn variables(&self) -> &[Variable] {
+            &self.0
+        }
+        fn outputs(&self, x: &[f64]) -> Result<Option<Vec<f64>>, Interrupted> {
+            match self.1.fetch_add(1, Ordering::Relaxed) {
+                0..20 => Ok(Some(vec![x[0] * (0.7 - x[0])])),
+                _ => Err(Interrupted),
+            }
+        }
+        fn judge(&self, _: &[f64], outputs: &[f64]) -> Judged {
+            Judged {
+                objectives: outputs.to_vec(),
+                limits: vec![],
+            }
+        }
+    }
+    let problem = Stopped(
+        vec![variable(0.0, 1.0, Values::Continuous)],
+        AtomicUsize::new(0),
+    );
+    let mut search = Search::new(&problem, Settings::default());
+    assert!(search.run(&[vec![0.9]]).is_err());
+    assert!(search.samples().len() >= 17, "{}", search.samples().len());
+    assert!(search.best().is_some());
 }

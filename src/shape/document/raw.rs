@@ -122,6 +122,7 @@ impl ShapeDocument {
             placement: surface.placement,
             force: RequestedForce::default(),
             weights: None,
+            direction_jnd_deg: fluxform_base::units::DIRECTION_JND_DEG,
             grid_is_given: surface.samples_are_given,
         })
     }

@@ -11,7 +11,7 @@ use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
 use fluxform_base::force_direction::{ForceDirection, NormalForce, RequestedForce};
 use fluxform_base::point_weights::Weights;
-use fluxform_base::units::m_from_mm;
+use fluxform_base::units::{DIRECTION_JND_DEG, m_from_mm};
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
 use fluxform_design::message_text::{nearest, quoted};
@@ -87,6 +87,8 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     };
     let bodies = bodies(root);
     let force = force(root);
+    let noticed = Rule::any("degrees").bound(Bound::Within(1.0, 89.0));
+    let direction_jnd = root.number_or("direction_jnd_deg", &noticed, DIRECTION_JND_DEG);
     let Points {
         grid,
         is_given,
@@ -100,6 +102,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         placement,
         grid: grid?,
         force,
+        direction_jnd_deg: direction_jnd.value,
         weights,
         grid_is_given: is_given,
     })
@@ -258,6 +261,10 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "normal_force",
         "of `normal`: lambda times the height is the force's `magnitude`, or its `upward` part",
+    ),
+    (
+        "direction_jnd_deg",
+        "angle between forces that a finger just notices: how static currents weigh sideways errors",
     ),
     (
         "points.outside",

@@ -3,8 +3,9 @@
 use clap::Args;
 
 use super::physics::{ArrayPhysics, Constant, Journal};
-use super::{ArrayEnding, ArrayOptimization, ArrayRequest, optimize_array, tables, text};
+use super::{ArrayEnding, ArrayRequest, optimize_array, tables, text};
 use crate::RunError;
+use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::SurfaceFlags;
 use crate::cli::documents;
@@ -33,7 +34,7 @@ pub struct ArrayFlags {
     #[arg(long, value_name = "KEY=VALUES", requires = "shapes")]
     pub vary: Vec<String>,
     /// The force constant that is made large
-    #[arg(long, value_name = "NAME", requires = "shapes", default_value = "jnd",
+    #[arg(long, hide_short_help = true, value_name = "NAME", requires = "shapes", default_value = "jnd",
           value_parser = values::named::<Constant>())]
     pub constant: Constant,
     /// Weights of the shapes in the geometric mean of their force constants, in order [default:
@@ -42,7 +43,7 @@ pub struct ArrayFlags {
           num_args = 1.., conflicts_with = "smallest")]
     pub shares: Vec<f64>,
     /// Make the smallest of the shapes' gains large, not their mean
-    #[arg(long, requires = "shapes")]
+    #[arg(long, hide_short_help = true, requires = "shapes")]
     pub smallest: bool,
     /// Most arrays that the search computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
@@ -95,11 +96,13 @@ impl ArrayFlags {
             .map_err(|fault| Failure::Documents(vec![fault]))?;
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
-        let mark = super::super::command::mark(shared.design, &document.text);
+        let mark = mark(shared.design, &document.text);
         let overwrite = Overwrite::beginning(shared.force, &mark, &inputs[..1])
             .protecting(document.also_read());
-        if let Some(FileArgument::Path(path)) = shared.out {
-            overwrite.check(path).map_err(RunError::from)?;
+        for file in [shared.out, self.journal.as_ref()].into_iter().flatten() {
+            if let FileArgument::Path(path) = file {
+                overwrite.check(path).map_err(RunError::from)?;
+            }
         }
         let files = [
             shared.out,
@@ -111,13 +114,17 @@ impl ArrayFlags {
             FileArgument::Path(path) => Some(path),
             FileArgument::Standard => None,
         });
-        check_distinct(&paths.collect::<Vec<_>>()).map_err(RunError::from)?;
-        let pictures = [&self.front, &self.plot].map(|file| {
-            file.as_ref()
-                .map(|file| Picture::new(file, shared.force, document.also_read()))
-        });
-        for picture in pictures.iter().flatten() {
-            picture.check(&inputs)?;
+        check_distinct(paths.collect::<Vec<_>>()).map_err(RunError::from)?;
+        let plot = self.plot.as_ref();
+        let plot = plot.map(|file| Picture::new(file, shared.force, document.also_read()));
+        if let Some(plot) = &plot {
+            plot.check(&inputs)?;
+        }
+        // The head of the table is its mark.
+        let of_table = Overwrite::beginning(shared.force, tables::HEAD, &inputs[..1])
+            .protecting(document.also_read());
+        if let Some(FileArgument::Path(path)) = &self.front {
+            of_table.check(path).map_err(RunError::from)?;
         }
         let bar = begin(printer);
         let physics = ArrayPhysics::new(
@@ -139,19 +146,29 @@ impl ArrayFlags {
         let seconds = bar.take_seconds();
         drop(physics);
         drop(bar);
-        self.write_journal(&journal, &overwrite)?;
+        self.write_journal(&journal, &mark, &overwrite, printer)?;
         let result = ended?;
         for warning in &result.warnings {
             printer.warning(warning);
         }
-        let mut place = write_design(&result, &mark, &overwrite, shared.out, printer)?;
-        let tables = [Some(tables::csv(&result)), tables::svg(&result)];
-        for (picture, table) in pictures.iter().zip(tables) {
-            if let (Some(picture), Some(table)) = (picture, table)
-                && picture.write(&result.inputs, &table, printer)? == Stream::Error
-            {
-                place = Stream::Error;
-            }
+        let text = format!(
+            "{mark}
+{}",
+            result.design_text
+        );
+        let mut place = written_to(shared.out, &text, &overwrite, printer)?;
+        let front = written_to(
+            self.front.as_ref(),
+            &tables::csv(&result),
+            &of_table,
+            printer,
+        )?;
+        let drawn = match (&plot, tables::svg(&result)) {
+            (Some(plot), Some(svg)) => plot.write(&result.inputs, &svg, printer)?,
+            _ => Stream::Output,
+        };
+        if [front, drawn].contains(&Stream::Error) {
+            place = Stream::Error;
         }
         let json = printer.with_warnings(&result);
         printer.summary(place, &json, || {
@@ -238,14 +255,17 @@ impl ArrayFlags {
         Ok(())
     }
 
-    fn write_journal(&self, journal: &Journal, overwrite: &Overwrite) -> Result<(), Failure> {
-        let Some(FileArgument::Path(path)) = &self.journal else {
-            return Ok(());
-        };
-        let text =
-            serde_json::to_string_pretty(journal).map_err(|e| Failure::Input(e.to_string()))?;
-        write(path, overwrite, |out| out.write_all(text.as_bytes())).map_err(RunError::from)?;
-        Ok(())
+    fn write_journal(
+        &self,
+        journal: &Journal,
+        mark: &str,
+        overwrite: &Overwrite,
+        printer: &Printer,
+    ) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(journal);
+        let text = text.map_err(|error| Failure::Input(error.to_string()))?;
+        let file = self.journal.as_ref();
+        written_to(file, &format!("{mark}\n{text}\n"), overwrite, printer).map(|_| ())
     }
 }
 
@@ -289,15 +309,14 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
 /// CPU time of a coil's force at a point through coupled steel, s.
 const POINT_COIL_S: f64 = 2e-6;
 
-fn write_design(
-    result: &ArrayOptimization,
-    mark: &str,
+/// Writes a text where that was requested; returns where the summary goes.
+fn written_to(
+    file: Option<&FileArgument>,
+    text: &str,
     overwrite: &Overwrite,
-    out: Option<&FileArgument>,
     printer: &Printer,
 ) -> Result<Stream, Failure> {
-    let text = format!("{mark}\n{}", result.design_text);
-    match out {
+    match file {
         None => Ok(Stream::Output),
         Some(FileArgument::Standard) => {
             printer.data(|out| out.write_all(text.as_bytes()))?;
@@ -308,4 +327,13 @@ fn write_design(
             Ok(Stream::Output)
         }
     }
+}
+
+/// The line by which a design that was made of this one is known from any other file.
+pub(in crate::commands::optimize) fn mark(design: &FileArgument, text: &str) -> String {
+    format!(
+        "# Made of {} (sha256 {}) by `fluxform optimize`.",
+        design.as_given().display(),
+        sha256_hex(text.as_bytes())
+    )
 }

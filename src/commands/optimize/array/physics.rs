@@ -8,6 +8,7 @@ use serde::Serialize;
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use crate::RunError;
+use crate::bundle::artefact::sha256_hex;
 use crate::coil::array_search::problem::{Level, Physical, Physics};
 use crate::commands::discretize;
 use crate::commands::lambda::WantedPoints;
@@ -67,6 +68,9 @@ impl Constant {
     }
 }
 
+/// Digest of the sources of this build.
+const BUILD: &str = env!("FLUXFORM_BUILD");
+
 /// What was computed, by a digest of the design.
 pub type Journal = BTreeMap<String, Option<Physical>>;
 
@@ -84,6 +88,8 @@ pub struct ArrayPhysics<'a> {
     coarse: Vec<WantedPoints>,
     fine: Vec<WantedPoints>,
     progress: &'a dyn Progress,
+    /// Digest of all that decides forces and constants but the design.
+    origin: String,
     /// Evaluations reported.
     reported: AtomicUsize,
     /// What was computed before, in this run or an earlier one.
@@ -112,12 +118,23 @@ impl<'a> ArrayPhysics<'a> {
             };
             shapes.iter().map(of).collect()
         };
+        let (coarse, fine) = (points(SEARCH_SAMPLES)?, points(usize::MAX)?);
+        let places = |points: &WantedPoints| {
+            (
+                points.positions_m.clone(),
+                points.rule,
+                points.areas.clone(),
+            )
+        };
+        let all: Vec<_> = coarse.iter().chain(&fine).map(places).collect();
+        let origin = format!("{BUILD} {constant:?} {jnd_weight:?} {tolerance:?} {all:?}");
         Ok(Self {
+            origin: sha256_hex(origin.as_bytes()),
             constant,
             jnd_weight,
             tolerance,
-            coarse: points(SEARCH_SAMPLES)?,
-            fine: points(usize::MAX)?,
+            coarse,
+            fine,
             progress,
             reported: AtomicUsize::new(0),
             known: Mutex::default(),
@@ -222,18 +239,18 @@ impl<'a> ArrayPhysics<'a> {
                 _ => return Ok(None),
             }
         }
-        let single = Single::new(&scene)?;
+        let (inductance_h, core_field_t) = Single::essentials(&scene)?;
         let added = |coil: usize| solved.steel().added_inductance_h(coil, coil);
         let of_array = (0..coils).map(|coil| scene.circuit.inductance_h + added(coil));
         let array_inductance_h = match crate::scene::coupled(design) {
             true => of_array.fold(0.0, f64::max),
-            false => single.inductance_h,
+            false => inductance_h,
         };
         Ok(Some(Physical {
             lambda_n_per_m,
-            inductance_h: single.inductance_h,
+            inductance_h,
             array_inductance_h,
-            core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
+            core_field_t,
         }))
     }
 
@@ -293,17 +310,8 @@ impl Physics for ArrayPhysics<'_> {
     ) -> Result<Option<Physical>, Interrupted> {
         self.progress.check()?;
         // Debug text holds every number to the last bit.
-        let key = format!(
-            "{level:?} {raised_m:?} {:?}",
-            (
-                &design.coil,
-                &design.wire,
-                &design.core,
-                &design.array,
-                &design.magnet
-            )
-        );
-        let key = crate::bundle::artefact::sha256_hex(key.as_bytes());
+        let key = format!("{} {level:?} {raised_m:?} {design:?}", self.origin);
+        let key = sha256_hex(key.as_bytes());
         let known = self
             .known
             .lock()

@@ -5,11 +5,14 @@ use crate::coil::array_search::study::TRADED;
 use crate::coil::limits::LimitName;
 use crate::plot::pareto::{Panel, ParetoPlot};
 
+/// How the table begins.
+pub const HEAD: &str = "quantity,value,gain";
+
 /// One row a point: quantity, its value, the gain, and every variable.
 pub fn csv(result: &ArrayOptimization) -> String {
     let points = result.study.as_ref().map_or(&[][..], |study| &study.front);
     let keys: Vec<&str> = result.values.keys().map(String::as_str).collect();
-    let mut text = format!("quantity,value,gain,{}\n", keys.join(","));
+    let mut text = format!("{HEAD},{}\n", keys.join(","));
     for point in points {
         let value = |key: &&str| {
             point

@@ -1,0 +1,190 @@
+//! Steel beyond the cores: `[plate]` below them and bodies `[[iron]]`.
+
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+use super::reader::{Located, Section};
+use super::rule::{BODY_MM, Bound, OFFSET_MM, Rule};
+use super::sections::{LOW_CARBON_KNEE_T, RELATIVE_PERMEABILITY, RELATIVE_PERMEABILITY_DEFAULT};
+use fluxform_base::units::m_from_mm;
+
+/// Linear steel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearSteel {
+    /// mu_r.
+    pub relative_permeability: f64,
+    /// Flux density above which a warning is due, T.
+    pub knee_t: f64,
+}
+
+/// Sides or diameter of a plate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PlateOutline {
+    /// Along x and y, m.
+    Rectangle([f64; 2]),
+    /// Diameter, m.
+    Round(f64),
+}
+
+/// A level plate below the coils, its middle below the middle of their axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plate {
+    /// Thickness, m.
+    pub thickness_m: f64,
+    /// Its size.
+    pub outline: PlateOutline,
+    /// From the cores' (else the windings') lower ends down to its upper face, m; cores touch it at 0.
+    pub gap_m: f64,
+    /// Material.
+    pub steel: LinearSteel,
+}
+
+/// The shape of a body about its middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum IronShape {
+    /// Sides along x, y and z, m.
+    Box([f64; 3]),
+    /// About z: inner and outer diameter and length, m; the inner one 0 for a full cylinder.
+    Tube([f64; 3]),
+    /// Diameter, m.
+    Ball(f64),
+}
+
+/// A body of steel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iron {
+    /// Its shape.
+    pub shape: IronShape,
+    /// Its middle, m.
+    pub centre_m: [f64; 3],
+    /// Rotation about x, then y, then z, degrees.
+    pub rotate_deg: [f64; 3],
+    /// Material.
+    pub steel: LinearSteel,
+}
+
+fn steel(s: &mut Section<'_>) -> LinearSteel {
+    if s.has("bh_curve") {
+        s.ignore(&["bh_curve"]);
+        s.fault(
+            "bh_curve",
+            "plates and bodies of [[iron]] are solved as linear steel, not along a curve",
+            "give relative_permeability, and the curve's knee as knee_t: results state the largest flux \
+             density, and are worth nothing where it passes the knee",
+        );
+    }
+    LinearSteel {
+        relative_permeability: s
+            .number_or(
+                "relative_permeability",
+                &RELATIVE_PERMEABILITY,
+                RELATIVE_PERMEABILITY_DEFAULT,
+            )
+            .value,
+        knee_t: s
+            .number_or("knee_t", &Rule::any("T").positive(), LOW_CARBON_KNEE_T)
+            .value,
+    }
+}
+
+pub(super) fn plate(mut s: Section<'_>) -> Option<Plate> {
+    if !s.is_present() {
+        return None;
+    }
+    let size = BODY_MM.positive();
+    let thickness = s.required("thickness_mm", &size);
+    let (x, y) = (s.number("x_mm", &size), s.number("y_mm", &size));
+    let diameter = s.number("diameter_mm", &size);
+    let gap = s.number_or("gap_mm", &OFFSET_MM.bound(Bound::NotNegative), 0.0);
+    let steel = steel(&mut s);
+    let outline = match (x, y, diameter) {
+        (Some(x), Some(y), None) => Some(PlateOutline::Rectangle(
+            [x, y].map(|side| m_from_mm(side.value)),
+        )),
+        (None, None, Some(diameter)) => Some(PlateOutline::Round(m_from_mm(diameter.value))),
+        (x, _, _) => {
+            let key = if x.is_some() { "x_mm" } else { "diameter_mm" };
+            s.fault(
+                key,
+                "expected the plate's two sides or its diameter",
+                "give x_mm and y_mm, or give diameter_mm",
+            );
+            None
+        }
+    };
+    s.finish();
+    Some(Plate {
+        thickness_m: m_from_mm(thickness.value),
+        outline: outline?,
+        gap_m: m_from_mm(gap.value),
+        steel,
+    })
+}
+
+/// Kinds of bodies.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
+enum Kind {
+    /// A box.
+    Box,
+    /// A cylinder.
+    Cylinder,
+    /// A tube.
+    Tube,
+    /// A ball.
+    Ball,
+}
+
+pub(super) fn body(mut s: Section<'_>) -> Option<Iron> {
+    let size = BODY_MM.positive();
+    let kind = s.choice::<Kind>("shape");
+    if kind.is_none() && !s.has("shape") {
+        let names = <Kind as VariantArray>::VARIANTS
+            .iter()
+            .map(|&kind| kind.into());
+        let names: Vec<&'static str> = names.collect();
+        s.missing("shape", &format!("one of {}", names.join(", ")));
+    }
+    let sides = s.tuple_if_given::<3>("size_mm", &size);
+    let diameter = s.number("diameter_mm", &size);
+    let inner = s.number("inner_diameter_mm", &size);
+    let length = s.number("length_mm", &size);
+    let centre = s.tuple("center_mm", &BODY_MM);
+    let rotate_deg = s.tuple("rotate_deg", &Rule::any("degrees"));
+    let steel = steel(&mut s);
+    let keys: &[&str] = match kind {
+        None => &[],
+        Some(Kind::Box) => &["size_mm"],
+        Some(Kind::Cylinder) => &["diameter_mm", "length_mm"],
+        Some(Kind::Tube) => &["diameter_mm", "inner_diameter_mm", "length_mm"],
+        Some(Kind::Ball) => &["diameter_mm"],
+    };
+    for key in ["size_mm", "diameter_mm", "inner_diameter_mm", "length_mm"] {
+        if kind.is_some() && s.has(key) != keys.contains(&key) {
+            let message = if s.has(key) {
+                "this shape has no such size"
+            } else {
+                "this shape needs this size, which is missing"
+            };
+            s.fault(key, message, &format!("it has {}", keys.join(", ")));
+        }
+    }
+    let of = |value: Option<Located<f64>>| value.map_or(0.0, |v| m_from_mm(v.value));
+    let [inner, outer, length] = [of(inner), of(diameter), of(length)];
+    if kind == Some(Kind::Tube) && inner >= outer {
+        let message = "the inner diameter must be below the outer one";
+        s.fault("inner_diameter_mm", message, "are the two swapped?");
+    }
+    s.finish();
+    Some(Iron {
+        shape: match kind? {
+            Kind::Box => IronShape::Box(sides?.map(m_from_mm)),
+            Kind::Cylinder | Kind::Tube => IronShape::Tube([inner, outer, length]),
+            Kind::Ball => IronShape::Ball(outer),
+        },
+        centre_m: centre.map(m_from_mm),
+        rotate_deg,
+        steel,
+    })
+}

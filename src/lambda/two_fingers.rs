@@ -1,0 +1,211 @@
+//! Two fingers on one array: at a pair of points the currents of least power that give both their forces.
+//!
+//! Two magnets push each other too: for dipoles at a distance `r` along the unit vector `n`
+//!
+//! ```text
+//! F = 3 mu_0 / (4 pi r^4) ((m_1.n) m_2 + (m_2.n) m_1 + (m_1.m_2) n - 5 (m_1.n)(m_2.n) n)
+//! ```
+//!
+//! on the second one, whatever the currents, which must give what that leaves of both requests. Whether they
+//! can is a least squares problem within the limits: two rows for the upward forces, six for the vectors.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::random::Random;
+use fluxform_numerics::vec3::dot;
+
+use super::feedback::FeedbackError;
+use super::problem::Settings;
+use super::uncertainty::ErrorForm;
+use super::vector_feedback::VectorProblem;
+
+/// Pairs looked at, at most.
+const PAIRS: usize = 1000;
+/// Pairs tried for each that is looked at, where few points have a partner.
+const TRIALS: usize = 200;
+/// A force counts as given within this share of the larger request.
+const GIVEN: f64 = 1e-3;
+/// Price of power, relative to the forces' square over resistance: below what `GIVEN` sees.
+const PRICE: f64 = 1e-9;
+/// The pairs are the same in every run.
+const SEED: u64 = 0x2f19;
+
+/// Pairs of points under two fingers with feedback.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TwoFingers {
+    /// The force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// Distances of the two fingers, m.
+    pub apart_m: [f64; 2],
+    /// Random pairs of points so far apart; 0 where the object has none.
+    pub pairs: usize,
+    /// Share of them at which both get their upward force.
+    pub upward_share: f64,
+    /// Share of them at which both get their force vector.
+    pub vector_share: f64,
+    /// Mean power where both get their upward force, W.
+    pub upward_power_w: f64,
+    /// Mean power where both get their force vector, W.
+    pub vector_power_w: f64,
+    /// The largest force of one magnet on the other at any pair, N.
+    pub magnets_force_n: f64,
+    /// The same over the larger of the two requests there.
+    pub magnets_force_share: f64,
+}
+
+/// Force of a dipole on another one of the same moment (A m^2), `from_first_m` away, N.
+#[must_use]
+pub fn between_magnets_n(moment_a_m2: [f64; 3], from_first_m: [f64; 3]) -> [f64; 3] {
+    let distance = dot(from_first_m, from_first_m).sqrt();
+    let n = from_first_m.map(|part| part / distance);
+    let (along, square) = (dot(moment_a_m2, n), dot(moment_a_m2, moment_a_m2));
+    let scale = 3.0 * MU_0_T_M_PER_A / (4.0 * PI * distance.powi(4));
+    std::array::from_fn(|k| {
+        scale * (2.0 * along * moment_a_m2[k] + (square - 5.0 * along * along) * n[k])
+    })
+}
+
+/// What one pair comes to.
+struct Pair {
+    given: [bool; 2],
+    power_w: [f64; 2],
+    magnets_n: f64,
+    magnets_share: f64,
+}
+
+/// Random pairs of the points at `positions_m`, `apart_m` apart, under magnets of one moment.
+///
+/// # Errors
+/// Where the problem is malformed.
+///
+/// # Panics
+/// When positions, directions or sideways forces are fewer than the points.
+pub fn two_fingers(
+    problem: &VectorProblem,
+    positions_m: &[[f64; 3]],
+    moment_a_m2: [f64; 3],
+    lambda_n_per_m: f64,
+    apart_m: [f64; 2],
+) -> Result<TwoFingers, FeedbackError> {
+    problem.upward.validate(&Settings::default())?;
+    let pairs = random_pairs(positions_m, apart_m);
+    let done: Vec<Pair> = pairs
+        .par_iter()
+        .map(|pair| {
+            fluxform_base::progress::poll();
+            one_pair(problem, positions_m, moment_a_m2, lambda_n_per_m, *pair)
+        })
+        .collect();
+    let share = |kind: usize| {
+        let given = done.iter().filter(|pair| pair.given[kind]).count();
+        given as f64 / done.len().max(1) as f64
+    };
+    let power = |kind: usize| {
+        let given = done.iter().filter(|pair| pair.given[kind]);
+        let (sum, count) = given.fold((0.0, 0_usize), |(sum, count), pair| {
+            (sum + pair.power_w[kind], count + 1)
+        });
+        sum / count.max(1) as f64
+    };
+    let most = |of: fn(&Pair) -> f64| done.iter().map(of).fold(0.0, f64::max);
+    Ok(TwoFingers {
+        lambda_n_per_m,
+        apart_m,
+        pairs: done.len(),
+        upward_share: share(0),
+        vector_share: share(1),
+        upward_power_w: power(0),
+        vector_power_w: power(1),
+        magnets_force_n: most(|pair| pair.magnets_n),
+        magnets_force_share: most(|pair| pair.magnets_share),
+    })
+}
+
+fn random_pairs(positions_m: &[[f64; 3]], [least_m, most_m]: [f64; 2]) -> Vec<[usize; 2]> {
+    let mut random = Random::new(SEED);
+    let points = positions_m.len();
+    let mut pairs = Vec::new();
+    for _ in 0..PAIRS * TRIALS {
+        if pairs.len() == PAIRS || points < 2 {
+            break;
+        }
+        let pair = [random.below(points), random.below(points)];
+        let between = between(positions_m, pair);
+        let distance = dot(between, between).sqrt();
+        if distance > 0.0 && (least_m..=most_m).contains(&distance) {
+            pairs.push(pair);
+        }
+    }
+    pairs
+}
+
+fn between(positions_m: &[[f64; 3]], [a, b]: [usize; 2]) -> [f64; 3] {
+    std::array::from_fn(|k| positions_m[b][k] - positions_m[a][k])
+}
+
+fn one_pair(
+    problem: &VectorProblem,
+    positions_m: &[[f64; 3]],
+    moment_a_m2: [f64; 3],
+    lambda: f64,
+    pair: [usize; 2],
+) -> Pair {
+    let upward = &problem.upward;
+    let coils = upward.coils();
+    let on_second = between_magnets_n(moment_a_m2, between(positions_m, pair));
+    let of_magnets = [on_second.map(|part| -part), on_second];
+    let axes = [
+        problem.sides_n_per_a[0],
+        problem.sides_n_per_a[1],
+        upward.forces_n_per_a,
+    ];
+    let row =
+        |finger: usize, axis: usize| &axes[axis][pair[finger] * coils..(pair[finger] + 1) * coils];
+    let request = |finger: usize, axis: usize| {
+        let point = pair[finger];
+        lambda * upward.height_m[point] * problem.direction[point][axis]
+    };
+    let wanted = |finger: usize, axis: usize| {
+        let pull = upward.offset_n.map_or(0.0, |all| all[pair[finger]]);
+        request(finger, axis) - of_magnets[finger][axis] - if axis == 2 { pull } else { 0.0 }
+    };
+    let length =
+        |of: &dyn Fn(usize) -> f64| (0..3).map(|axis| of(axis).powi(2)).sum::<f64>().sqrt();
+    let largest = length(&|axis| request(0, axis)).max(length(&|axis| request(1, axis)));
+    let solved = |first_axis: usize| -> (bool, f64) {
+        let mut form = ErrorForm::new(coils);
+        let mut strongest = 0.0_f64;
+        for finger in 0..2 {
+            for axis in first_axis..3 {
+                let row = row(finger, axis);
+                strongest = row.iter().fold(strongest, |most, g| most.max(g.abs()));
+                form.add_square(row, 1.0, 0.0);
+                form.add_target(row, wanted(finger, axis), 1.0, 1.0);
+            }
+        }
+        let mut currents = vec![0.0; coils];
+        let ohm = upward.resistance_ohm;
+        let least_ohm = ohm.iter().copied().fold(f64::INFINITY, f64::min);
+        let price = (PRICE * strongest * strongest / least_ohm).max(f64::MIN_POSITIVE);
+        form.minimise(upward, price, &mut currents);
+        let power = ohm.iter().zip(&currents).map(|(ohm, i)| ohm * i * i).sum();
+        (form.value(&currents).sqrt() <= GIVEN * largest, power)
+    };
+    let [(upward_given, upward_w), (vector_given, vector_w)] = [2, 0].map(solved);
+    let magnets_n = length(&|axis| on_second[axis]);
+    Pair {
+        given: [upward_given, vector_given],
+        power_w: [upward_w, vector_w],
+        magnets_n,
+        magnets_share: if largest > 0.0 {
+            magnets_n / largest
+        } else {
+            0.0
+        },
+    }
+}

@@ -1,0 +1,304 @@
+//! Products with a matrix of blocks that depend on the difference of two cells of a plane lattice alone,
+//! by Fourier transforms.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DMatrixView};
+use rayon::prelude::*;
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+/// Pairs of columns that are transformed together; fixed, so that memory is bounded and bytes do not
+/// depend on threads.
+const PAIRS: usize = 16;
+
+/// The sum over all cells `j` of a block for the step from `j` to `i`, applied at `j`, for every cell `i`.
+pub struct BlockToeplitz {
+    rows: usize,
+    columns: usize,
+    plane: Plane,
+    /// Places of the cells in the plane.
+    places: Vec<usize>,
+    /// Of half of the frequencies: real part over imaginary part.
+    spectrum: Vec<DMatrix<f64>>,
+}
+
+impl BlockToeplitz {
+    /// For `cells` of a lattice and blocks of `rows` x `columns`, `put` being given every step and its
+    /// block, zero, to fill.
+    pub fn new(
+        cells: &[[usize; 2]],
+        (rows, columns): (usize, usize),
+        put: impl Fn([isize; 2], &mut DMatrix<f64>) + Sync,
+    ) -> Self {
+        let most = |axis: usize| cells.iter().map(|c| c[axis]).max().unwrap_or(0);
+        let steps = [0, 1].map(most).map(|most| most as isize);
+        let plane = Plane::new(steps.map(|most| smooth(2 * most as usize + 1)));
+        let all: Vec<[isize; 2]> = (-steps[1]..=steps[1])
+            .flat_map(|y| (-steps[0]..=steps[0]).map(move |x| [x, y]))
+            .collect();
+        let blocks: Vec<(usize, DMatrix<f64>)> = all
+            .par_iter()
+            .map(|step| {
+                fluxform_base::progress::poll();
+                let mut block = DMatrix::zeros(rows, columns);
+                put(*step, &mut block);
+                (plane.place(*step), block)
+            })
+            .collect();
+        // Two real entries are one complex one: a column of a block together with the next.
+        let half = plane.half();
+        let entries: Vec<(usize, usize)> = (0..columns.div_ceil(2))
+            .flat_map(|pair| (0..rows).map(move |row| (row, 2 * pair)))
+            .collect();
+        let mut spectrum = vec![DMatrix::zeros(2 * rows, columns); half];
+        for entries in entries.chunks(PAIRS * 16) {
+            let transformed: Vec<Vec<Complex<f64>>> = entries
+                .par_iter()
+                .map(|&(row, column)| {
+                    fluxform_base::progress::poll();
+                    let mut values = vec![Complex::default(); plane.size()];
+                    for (place, block) in &blocks {
+                        let next = block.get((row, column + 1)).copied().unwrap_or(0.0);
+                        values[*place] = Complex::new(block[(row, column)], next);
+                    }
+                    plane.transform(&mut values, false);
+                    values
+                })
+                .collect();
+            spectrum.par_iter_mut().enumerate().for_each(|(k, block)| {
+                for (&(row, column), values) in entries.iter().zip(&transformed) {
+                    let (one, other) = (values[k], values[plane.opposite(k)].conj());
+                    let (first, second) = ((one + other) * 0.5, (one - other) * 0.5);
+                    block[(row, column)] = first.re;
+                    block[(row + rows, column)] = first.im;
+                    if column + 1 < columns {
+                        block[(row, column + 1)] = second.im;
+                        block[(row + rows, column + 1)] = -second.re;
+                    }
+                }
+            });
+        }
+        Self {
+            rows,
+            columns,
+            places: cells
+                .iter()
+                .map(|cell| plane.place(cell.map(|c| c as isize)))
+                .collect(),
+            plane,
+            spectrum,
+        }
+    }
+
+    /// The product with columns that hold every cell's values one after the other.
+    #[must_use]
+    pub fn apply(&self, values: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.rows * self.places.len(), values.ncols());
+        for first in (0..values.ncols()).step_by(2 * PAIRS) {
+            let count = (2 * PAIRS).min(values.ncols() - first);
+            self.apply_some(values.columns(first, count), first, &mut out);
+        }
+        out
+    }
+
+    fn apply_some(&self, values: DMatrixView<'_, f64>, first: usize, out: &mut DMatrix<f64>) {
+        // A real product acts on the parts of a complex column alike: two columns are one.
+        let pairs = values.ncols().div_ceil(2);
+        let spectra: Vec<Vec<Complex<f64>>> = (0..self.columns * pairs)
+            .into_par_iter()
+            .map(|index| {
+                fluxform_base::progress::poll();
+                let (channel, pair) = (index % self.columns, index / self.columns);
+                let mut plane = vec![Complex::default(); self.plane.size()];
+                for (cell, place) in self.places.iter().enumerate() {
+                    let at = |column| values.get((cell * self.columns + channel, column));
+                    let next = at(2 * pair + 1).copied().unwrap_or(0.0);
+                    plane[*place] =
+                        Complex::new(values[(cell * self.columns + channel, 2 * pair)], next);
+                }
+                self.plane.transform(&mut plane, false);
+                plane
+            })
+            .collect();
+        // Blocks of opposite frequencies are conjugate.
+        let half = self.spectrum.len();
+        let products: Vec<[DMatrix<f64>; 2]> = (0..half)
+            .into_par_iter()
+            .map(|k| {
+                let both = [k, self.plane.opposite(k)];
+                // Real parts of the one frequency, imaginary ones, then those of the other.
+                let given = DMatrix::from_fn(self.columns, 4 * pairs, |channel, column| {
+                    let value =
+                        spectra[column % pairs * self.columns + channel][both[column / pairs / 2]];
+                    if (column / pairs).is_multiple_of(2) {
+                        value.re
+                    } else {
+                        value.im
+                    }
+                });
+                let product = &self.spectrum[k] * given;
+                let (re, im) = (
+                    product.rows(0, self.rows),
+                    product.rows(self.rows, self.rows),
+                );
+                [0, 1].map(|of| {
+                    let sign = if of == 0 { 1.0 } else { -1.0 };
+                    let (real, imaginary) = (2 * of * pairs, (2 * of + 1) * pairs);
+                    DMatrix::from_fn(self.rows, 2 * pairs, |row, column| {
+                        if column < pairs {
+                            re[(row, real + column)] - sign * im[(row, imaginary + column)]
+                        } else {
+                            let column = column - pairs;
+                            re[(row, imaginary + column)] + sign * im[(row, real + column)]
+                        }
+                    })
+                })
+            })
+            .collect();
+        let scale = 1.0 / self.plane.size() as f64;
+        let planes: Vec<Vec<Complex<f64>>> = (0..self.rows * pairs)
+            .into_par_iter()
+            .map(|index| {
+                fluxform_base::progress::poll();
+                let (row, pair) = (index % self.rows, index / self.rows);
+                let mut plane = vec![Complex::default(); self.plane.size()];
+                for (k, both) in products.iter().enumerate() {
+                    for (place, product) in [k, self.plane.opposite(k)].into_iter().zip(both) {
+                        plane[place] =
+                            Complex::new(product[(row, pair)], product[(row, pair + pairs)]);
+                    }
+                }
+                self.plane.transform(&mut plane, true);
+                plane
+            })
+            .collect();
+        for (index, plane) in planes.iter().enumerate() {
+            let (row, pair) = (index % self.rows, index / self.rows);
+            for (cell, place) in self.places.iter().enumerate() {
+                let value = plane[*place] * scale;
+                out[(cell * self.rows + row, first + 2 * pair)] = value.re;
+                if 2 * pair + 1 < values.ncols() {
+                    out[(cell * self.rows + row, first + 2 * pair + 1)] = value.im;
+                }
+            }
+        }
+    }
+}
+
+/// A periodic plane whose transform has the first axis last.
+struct Plane {
+    size: [usize; 2],
+    forward: [Arc<dyn Fft<f64>>; 2],
+    inverse: [Arc<dyn Fft<f64>>; 2],
+}
+
+impl Plane {
+    fn new(size: [usize; 2]) -> Self {
+        let mut planner = FftPlanner::new();
+        Self {
+            size,
+            forward: size.map(|n| planner.plan_fft_forward(n)),
+            inverse: size.map(|n| planner.plan_fft_inverse(n)),
+        }
+    }
+
+    fn size(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    fn place(&self, step: [isize; 2]) -> usize {
+        let [x, y] = [0, 1].map(|axis| step[axis].rem_euclid(self.size[axis] as isize) as usize);
+        y * self.size[0] + x
+    }
+
+    /// Index of the opposite frequency.
+    fn opposite(&self, k: usize) -> usize {
+        let [nx, ny] = self.size;
+        let (x, y) = (k / ny, k % ny);
+        (nx - x) % nx * ny + (ny - y) % ny
+    }
+
+    /// Frequencies below which every one or its opposite is.
+    fn half(&self) -> usize {
+        (self.size[0] / 2 + 1) * self.size[1]
+    }
+
+    /// From places to frequencies, or back, without the factor of the size.
+    fn transform(&self, values: &mut Vec<Complex<f64>>, back: bool) {
+        let [nx, ny] = self.size;
+        let (first, second) = if back {
+            ([ny, nx], [1, 0])
+        } else {
+            ([nx, ny], [0, 1])
+        };
+        let plans = if back { &self.inverse } else { &self.forward };
+        plans[second[0]].process(values);
+        let mut turned = vec![Complex::default(); values.len()];
+        for (row, from) in values.chunks_exact(first[0]).enumerate() {
+            for (column, value) in from.iter().enumerate() {
+                turned[column * first[1] + row] = *value;
+            }
+        }
+        plans[second[1]].process(&mut turned);
+        *values = turned;
+    }
+}
+
+/// The least number from `least` up without prime factors above five.
+fn smooth(least: usize) -> usize {
+    (least..)
+        .find(|n| {
+            let mut left = *n;
+            for prime in [2, 3, 5] {
+                while left % prime == 0 {
+                    left /= prime;
+                }
+            }
+            left == 1
+        })
+        .unwrap_or(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_the_blocks_one_by_one() {
+        // A lattice with a gap, blocks of three rows and five columns, odd and even numbers of columns.
+        let cells: Vec<[usize; 2]> = (0..4)
+            .flat_map(|y| (0..6).map(move |x| [x, y]))
+            .filter(|cell| *cell != [2, 1])
+            .collect();
+        let entry = |[x, y]: [isize; 2], row: usize, column: usize| {
+            ((3 * x + 7 * y) as f64 * 0.37 + (row * 5 + column) as f64 * 1.3).sin()
+        };
+        let toeplitz = BlockToeplitz::new(&cells, (3, 5), |step, block| {
+            for row in 0..3 {
+                for column in 0..5 {
+                    block[(row, column)] = entry(step, row, column);
+                }
+            }
+        });
+        for columns in [1, 4, 37] {
+            let values = DMatrix::from_fn(5 * cells.len(), columns, |i, j| {
+                (0.71 * i as f64 + 1.9 * j as f64).cos()
+            });
+            let product = toeplitz.apply(&values);
+            for (i, to) in cells.iter().enumerate() {
+                for row in 0..3 {
+                    let mut sum = 0.0;
+                    for (j, from) in cells.iter().enumerate() {
+                        let step = [0, 1].map(|axis| to[axis] as isize - from[axis] as isize);
+                        for column in 0..5 {
+                            sum += entry(step, row, column) * values[(5 * j + column, columns - 1)];
+                        }
+                    }
+                    let off = (product[(3 * i + row, columns - 1)] - sum).abs();
+                    assert!(off < 1e-11, "{i} {row}: {off:e}");
+                }
+            }
+        }
+    }
+}

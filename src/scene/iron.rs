@@ -1,0 +1,306 @@
+//! The plate and other bodies of a design's steel.
+
+use super::Scene;
+use super::core_material::{Material, SceneCore};
+use super::steel::Solved;
+use crate::RunError;
+use crate::design::iron::{Iron as Described, IronShape, LinearSteel, PlateOutline};
+use crate::design::{Coupling, Design};
+use crate::field::iron::array::{IronArray, IronPeaks};
+use crate::field::iron::bodies::{Body, Coils, Iron, Outline, Plate, Solid, UPRIGHT};
+use crate::field::iron::face::Point;
+use crate::field::steel::CoreShape;
+use crate::field::winding::Winding;
+
+/// Bodies closer than this part of the smaller core radius or plate are neither apart nor joined.
+const LEAST_GAP: f64 = 0.01;
+/// Depth below the surface at which the largest |B| is looked for, and its largest part of a thickness, m.
+const DEPTH_M: f64 = 1e-3;
+const DEPTH_PART: f64 = 0.1;
+
+/// The steel of a design beyond its cores.
+#[derive(Debug, Clone)]
+pub struct SceneIron {
+    plate: Option<Plate>,
+    bodies: Vec<(Body, f64)>,
+    names: Vec<String>,
+    /// Height of the highest of it, m.
+    pub(super) top_m: f64,
+    /// Flux density above which a warning is due: the least of all bodies, T.
+    pub knee_t: f64,
+}
+
+impl SceneIron {
+    /// Of `design`; `None` where it has cores alone.
+    ///
+    /// # Errors
+    /// Steel along a curve, bodies that meet each other, a winding or a bore.
+    pub(super) fn new(
+        design: &Design,
+        winding: &Winding,
+        core: Option<&SceneCore>,
+    ) -> Result<Option<Self>, RunError> {
+        if !design.has_iron() {
+            return Ok(None);
+        }
+        let refuse = |message: &str| Err(RunError::Input(message.to_owned()));
+        if core.is_some_and(|core| matches!(core.material, Material::Curve(_))) {
+            return refuse(
+                "[core] bh_curve: with [plate] or [[iron]] steel is solved as linear; give \
+                 relative_permeability and knee_t: results state the largest flux density",
+            );
+        }
+        if core.is_some() && design.array.coupling == Coupling::None {
+            return refuse(
+                "[array] coupling = \"none\": steel beyond the cores joins them; take it out",
+            );
+        }
+        if design.magnet.passive_force {
+            return refuse(
+                "[magnet] passive_force = true: the pull of [plate] and [[iron]] on the magnet is not \
+                 computed; leave it out",
+            );
+        }
+        let axes = &design.array.positions_m;
+        let plate = design.plate.map(|plate| Plate {
+            outline: match plate.outline {
+                PlateOutline::Rectangle(sides) => Outline::Rectangle(sides),
+                PlateOutline::Round(diameter) => Outline::Round(diameter),
+            },
+            centre_m: middle(axes),
+            top_m: core.map_or(-winding.length_m, |core| core.shape.bottom_m) - plate.gap_m,
+            thickness_m: plate.thickness_m,
+            chi: chi(plate.steel),
+        });
+        let bodies: Vec<(Body, f64)> = design
+            .iron
+            .iter()
+            .map(|iron| (body(iron), chi(iron.steel)))
+            .collect();
+        let heights = bodies
+            .iter()
+            .flat_map(|(body, _)| body.places_m())
+            .map(|place| place[2]);
+        let made = Self {
+            top_m: (heights.chain(plate.map(|plate| plate.top_m)))
+                .fold(f64::NEG_INFINITY, f64::max),
+            plate,
+            bodies,
+            names: (0..design.iron.len())
+                .map(|k| format!("[[iron]] {k}"))
+                .collect(),
+            knee_t: (design.iron.iter().map(|iron| iron.steel))
+                .chain(design.plate.map(|plate| plate.steel))
+                .fold(f64::INFINITY, |knee, steel| knee.min(steel.knee_t)),
+        };
+        made.check(axes, winding, core.map(|core| core.shape))?;
+        Ok(Some(made))
+    }
+
+    fn check(
+        &self,
+        axes: &[[f64; 2]],
+        winding: &Winding,
+        core: Option<CoreShape>,
+    ) -> Result<(), RunError> {
+        let outer = winding.outer_radius_m;
+        let full = |[x, y]: [f64; 2], radius: f64, low: f64, high: f64| Body {
+            solid: Solid::Tube([0.0, radius, high - low]),
+            centre_m: [x, y, 0.5 * (low + high)],
+            turn: UPRIGHT,
+        };
+        let plate = self.plate.map(|plate| ("[plate]".to_owned(), plate.body()));
+        let bodies = self
+            .names
+            .iter()
+            .cloned()
+            .zip(self.bodies.iter().map(|(body, _)| *body));
+        let all: Vec<(String, Body)> = plate.into_iter().chain(bodies).collect();
+        for (number, (name, body)) in all.iter().enumerate() {
+            for (coil, axis) in axes.iter().enumerate() {
+                let room = full(*axis, outer, -winding.length_m, 0.0);
+                if meets(body, &room, 0.0) {
+                    return Err(RunError::Input(format!(
+                        "{name} cuts the winding of coil {coil} or its bore, whose steel is [core]; move it or \
+                         make it smaller"
+                    )));
+                }
+                let Some(shape) = core else { continue };
+                let own = full(*axis, shape.radius_m, shape.bottom_m, shape.top_m);
+                let least = LEAST_GAP * shape.radius_m;
+                let joined = name == "[plate]"
+                    && self
+                        .plate
+                        .is_some_and(|plate| plate.top_m == shape.bottom_m);
+                if !joined && meets(body, &own, least) {
+                    return Err(RunError::Input(format!(
+                        "{name} is less than {:.3} mm from the core of coil {coil}: closer steel is not resolved, \
+                         and only [plate] with gap_mm = 0 joins the cores",
+                        least * 1e3
+                    )));
+                }
+            }
+            for (other, second) in &all[..number] {
+                let least = LEAST_GAP * size_m(body).min(size_m(second));
+                if meets(body, second, least) {
+                    return Err(RunError::Input(format!(
+                        "{name} and {other} are less than {:.3} mm apart or overlap: closer steel is not \
+                         resolved, and only cores and [plate] are joined",
+                        least * 1e3
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` up.
+    ///
+    /// # Errors
+    /// A core beside the plate; a node on a winding's edge.
+    pub(super) fn solve(
+        &self,
+        scene: &Scene,
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<IronArray, RunError> {
+        let coils = Coils {
+            winding: scene.winding,
+            positions_m: &scene.design.array.positions_m,
+            core: (scene.core.as_ref())
+                .map(|core| (core.shape, core.relative_permeability() - 1.0)),
+        };
+        let iron = Iron::new(coils, self.plate.as_ref());
+        let mut iron =
+            iron.map_err(|fault| RunError::Input(format!("[plate]: {fault}; make it larger")))?;
+        for (body, chi) in &self.bodies {
+            iron = iron.with(body.faces(), *chi);
+        }
+        Ok(IronArray::new(coils, &iron, tolerance, lowest_m)?)
+    }
+
+    /// Distance of a place from the nearest of it, m; below nothing inside.
+    pub(super) fn distance_m(&self, place_m: Point) -> f64 {
+        let plate = self.plate.map(|plate| plate.body());
+        let bodies = self.bodies.iter().map(|(body, _)| *body).chain(plate);
+        bodies.fold(f64::INFINITY, |least, body| {
+            least.min(body.distance_m(place_m))
+        })
+    }
+
+    /// The largest |B| of `solved` at these currents, in it and in the cores.
+    ///
+    /// # Errors
+    /// A solution without it; a place on a winding's edge.
+    pub fn peaks(&self, solved: &Solved, currents_a: &[f64]) -> Result<IronPeaks, RunError> {
+        let array = solved.steel().iron();
+        let array =
+            array.ok_or_else(|| RunError::Input("the solution holds no steel".to_owned()))?;
+        Ok(array.peaks(currents_a, self.depth_m())?)
+    }
+
+    /// Warnings about steel above its knee, where linear steel ends.
+    #[must_use]
+    pub fn above_knee(&self, scene: &Scene, peaks: &IronPeaks, at: &str) -> Vec<String> {
+        let of_core = scene
+            .core
+            .as_ref()
+            .map_or(f64::INFINITY, |core| core.knee_t);
+        let core_t = peaks
+            .cores
+            .iter()
+            .fold(0.0_f64, |most, (peak, _)| most.max(*peak));
+        let core = above_knee(core_t, of_core, &format!("a core of the array at {at}"));
+        let plate = above_knee(
+            peaks.elsewhere.0,
+            self.knee_t,
+            &format!("the plate or [[iron]] at {at}"),
+        );
+        core.into_iter().chain(plate).collect()
+    }
+
+    /// How far inside its surface the largest |B| is looked for, m.
+    fn depth_m(&self) -> f64 {
+        let plate = self.plate.map(|plate| plate.body());
+        let bodies = self.bodies.iter().map(|(body, _)| *body).chain(plate);
+        bodies.fold(DEPTH_M, |depth, body| depth.min(DEPTH_PART * size_m(&body)))
+    }
+}
+
+/// Refuses steel beyond the cores for a command that takes one coil alone.
+///
+/// # Errors
+/// A design that has any.
+pub fn without_iron(design: &Design, command: &str) -> Result<(), RunError> {
+    if design.has_iron() {
+        return Err(RunError::Input(format!(
+            "{command} computes one coil with its core alone: take [plate] and [[iron]] out; `evaluate` and \
+             `lambda` of several designs compare plates"
+        )));
+    }
+    Ok(())
+}
+
+fn chi(steel: LinearSteel) -> f64 {
+    steel.relative_permeability - 1.0
+}
+
+fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String> {
+    (peak_t > knee_t).then(|| {
+        format!(
+            "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as linear: the \
+             force will be smaller than stated; make the steel thicker, or lower the current"
+        )
+    })
+}
+
+/// The least thickness of a body, m.
+fn size_m(body: &Body) -> f64 {
+    match body.solid {
+        Solid::Box(sides) => sides.into_iter().fold(f64::INFINITY, f64::min),
+        Solid::Tube([inner, outer, length]) => length.min(outer - inner),
+        Solid::Ball(radius) => 2.0 * radius,
+    }
+}
+
+/// Whether two bodies come closer than `least_m`, by places on the surfaces of both.
+fn meets(a: &Body, b: &Body, least_m: f64) -> bool {
+    let of = |a: &Body, b: &Body| {
+        let mut places = a.places_m().chain([a.centre_m]);
+        places.any(|place| b.distance_m(place) < least_m - 1e-12)
+    };
+    of(a, b) || of(b, a)
+}
+
+fn middle(axes: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|axis| {
+        let ends = axes
+            .iter()
+            .map(|p| p[axis])
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+                (a.min(x), b.max(x))
+            });
+        0.5 * (ends.0 + ends.1)
+    })
+}
+
+fn body(iron: &Described) -> Body {
+    let [a, b, c] = iron.rotate_deg.map(|angle| angle.to_radians().sin_cos());
+    let ((sa, ca), (sb, cb), (sc, cc)) = (a, b, c);
+    Body {
+        solid: match iron.shape {
+            IronShape::Box(sides) => Solid::Box(sides),
+            IronShape::Tube([inner, outer, length]) => {
+                Solid::Tube([0.5 * inner, 0.5 * outer, length])
+            }
+            IronShape::Ball(diameter) => Solid::Ball(0.5 * diameter),
+        },
+        centre_m: iron.centre_m,
+        // About x, then y, then z.
+        turn: [
+            [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
+            [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
+            [-sb, cb * sa, cb * ca],
+        ],
+    }
+}

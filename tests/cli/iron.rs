@@ -1,0 +1,198 @@
+//! A plate below the cores and other bodies of steel.
+
+use serde_json::Value;
+
+use fluxform_testing::place::Place;
+use fluxform_testing::run::Ran;
+
+/// Two short coils, and what else there is.
+fn design(place: &Place, more: &str) {
+    let text = "name = \"pair\"\n[coil]\ninner_diameter_mm = 14.0\nouter_diameter_mm = 22.0\n\
+                length_mm = 30.0\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\n\
+                pitch_mm = 33.0\n[workspace]\nx_mm = [-20, 20, 5]\ny_mm = [-10, 10, 3]\n\
+                z_mm = [12, 30, 4]\n";
+    place.write("design.toml", &format!("{text}{more}"));
+}
+
+const CORE: &str = "[core]\nbelow_mm = 4.0\n";
+const PLATE: &str =
+    "[core]\nbelow_mm = 4.0\n[plate]\nthickness_mm = 4.0\nx_mm = 70.0\ny_mm = 40.0\n";
+
+fn evaluated(place: &Place, more: &str) -> Value {
+    design(place, more);
+    let args = [
+        "evaluate",
+        "design.toml",
+        "--tolerance",
+        "0.03",
+        "--format",
+        "json",
+    ];
+    place.run(&args).ends(0).json()
+}
+
+fn inductance_h(result: &Value) -> f64 {
+    result["array"]["coils"][0]["inductance_h"]
+        .as_f64()
+        .unwrap()
+}
+
+fn fields_t(place: &Place, more: &str, points: &str) -> Vec<[f64; 3]> {
+    design(place, more);
+    place.write("points.csv", &format!("x_m,y_m,z_m\n{points}\n"));
+    let ran = place.run(&["probe", "design.toml", "points.csv", "--tolerance", "0.03"]);
+    let ran = ran.ends(0);
+    let rows = ran.out.lines().skip(1);
+    rows.map(|row| {
+        let values: Vec<f64> = row.split(',').map(|value| value.parse().unwrap()).collect();
+        [values[4], values[5], values[6]]
+    })
+    .collect()
+}
+
+fn norm(field: [f64; 3]) -> f64 {
+    field.iter().map(|b| b * b).sum::<f64>().sqrt()
+}
+
+#[test]
+fn a_plate_joins_the_cores_and_one_far_below_does_nothing() {
+    let place = Place::new();
+    let alone = evaluated(&place, CORE);
+    let joined = evaluated(&place, PLATE);
+    let far = evaluated(&place, &format!("{PLATE}gap_mm = 200.0\n"));
+    assert!(inductance_h(&joined) > 1.15 * inductance_h(&alone));
+    assert!((inductance_h(&far) / inductance_h(&alone) - 1.0).abs() < 0.01);
+    let iron = &joined["array"]["iron"];
+    assert!(iron["peak_field_t"].as_f64().unwrap() > 0.1);
+    let own = joined["coil"]["settling_s"].as_f64().unwrap();
+    assert!(iron["settling_s"].as_f64().unwrap() > 1.1 * own);
+    assert!(
+        joined["array"]["coils"][1]["peak_field_t"]
+            .as_f64()
+            .unwrap()
+            > 0.1
+    );
+    assert!(alone["array"].get("iron").is_none());
+}
+
+#[test]
+fn a_thin_plate_warns_that_its_linear_steel_ends() {
+    let place = Place::new();
+    design(&place, &PLATE.replace("4.0\nx", "0.3\nx"));
+    let args = ["evaluate", "design.toml", "--tolerance", "0.05"];
+    place
+        .run(&args)
+        .ends(0)
+        .says(&["[[iron]]", "reaches", "taken as linear"]);
+}
+
+#[test]
+fn a_sheet_of_steel_shields_what_is_behind_it() {
+    let place = Place::new();
+    let wall = "[[iron]]\nshape = \"box\"\nsize_mm = [2, 90, 90]\ncenter_mm = [60, 0, -15]\n";
+    let behind = "0.07,0.004,-0.012";
+    let open = fields_t(&place, CORE, behind);
+    let shut = fields_t(&place, &format!("{CORE}{wall}"), behind);
+    assert!(norm(shut[1]) < 0.4 * norm(open[1]), "{shut:?} {open:?}");
+}
+
+#[test]
+fn a_bundle_of_a_plate_verifies() {
+    let place = Place::new();
+    design(&place, PLATE);
+    place.write(
+        "flat.toml",
+        "name = \"flat\"\nprimitive = \"flat\"\nside_mm = 30\nheight_mm = 20\n[points]\n\
+         x_mm = [-15, 15, 5]\ny_mm = [-15, 15, 5]\n",
+    );
+    let args = [
+        "calibrate",
+        "design.toml",
+        "flat.toml",
+        "--out",
+        "out",
+        "--tolerance",
+        "0.03",
+    ];
+    place.run(&args).ends(0);
+    place.run(&["verify", "out/pair/flat"]).ends(0);
+}
+
+fn refused(place: &Place, more: &str, words: &[&str]) -> Ran {
+    design(place, more);
+    place.run(&["evaluate", "design.toml"]).ends(3).says(words)
+}
+
+#[test]
+fn steel_that_cannot_be_is_refused_with_its_reason() {
+    let place = Place::new();
+    let plate = |with: &str| format!("{PLATE}{with}");
+    let body = |of: &str| format!("{CORE}[[iron]]\n{of}");
+    refused(
+        &place,
+        &PLATE.replace("70.0", "40.0"),
+        &["not wholly above the plate"],
+    );
+    refused(
+        &place,
+        &PLATE.replace("y_mm = 40.0\n", ""),
+        &["two sides or its diameter"],
+    );
+    refused(
+        &place,
+        &plate("bh_curve = \"x.csv\"\n"),
+        &["plate.bh_curve", "linear"],
+    );
+    refused(
+        &place,
+        &plate("gap_mm = 0.02\n"),
+        &["closer steel is not resolved"],
+    );
+    refused(
+        &place,
+        &plate("[magnet]\npassive_force = true\n"),
+        &["passive_force"],
+    );
+    let box_at = |size: &str, at: &str| {
+        body(&format!(
+            "shape = \"box\"\nsize_mm = {size}\ncenter_mm = {at}\n"
+        ))
+    };
+    refused(
+        &place,
+        &box_at("[5, 5, 5]", "[25, 0, -10]"),
+        &["cuts the winding of coil 1"],
+    );
+    refused(
+        &place,
+        &box_at("[5, 5, 5]", "[16.5, 0, 2]"),
+        &["[[iron]] 0", "core of coil 1"],
+    );
+    refused(
+        &place,
+        &body("size_mm = [5, 5, 5]\n"),
+        &["iron[0].shape", "box, cylinder, tube, ball"],
+    );
+    refused(
+        &place,
+        &body("shape = \"ball\"\nlength_mm = 3\n"),
+        &["no such size", "which is missing"],
+    );
+    design(&place, PLATE);
+    place.write("points.csv", "x_m,y_m,z_m\n0.001,0.002,-0.036\n");
+    let inside = place.run(&["probe", "design.toml", "points.csv", "--tolerance", "0.05"]);
+    inside
+        .ends(3)
+        .says(&["from the surface of [plate] or [[iron]]"]);
+    place
+        .run(&["optimize", "design.toml"])
+        .ends(3)
+        .says(&["optimize", "[plate]"]);
+    let roof = "shape = \"box\"\nsize_mm = [60, 60, 4]\ncenter_mm = [0, 0, 20]\n";
+    design(&place, &body(roof));
+    let map = ["map", "design.toml", "--out", "out", "--tolerance", "0.05"];
+    place
+        .run(&map)
+        .ends(3)
+        .says(&["from the surface of [plate] or [[iron]]"]);
+}
