@@ -3,6 +3,7 @@
 use crate::design::iron::{Plate, PlateOutline};
 use crate::design::{Coil, Design};
 use crate::plot::array::{ArrayPlot, Body, Part, Role};
+use crate::scene::iron::middle;
 
 /// The array of `design` with its coils, the magnet and the workspace; `None` without a coil.
 #[must_use]
@@ -44,8 +45,7 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
 
 /// The plate, its middle below the middle of the coils' axes.
 fn plate_body(design: &Design, coil: &Coil, plate: &Plate) -> Body {
-    let axes = &design.array.positions_m;
-    let middle = [0, 1].map(|k| axes.iter().map(|axis| axis[k]).sum::<f64>() / axes.len() as f64);
+    let middle = middle(&design.array.positions_m);
     let below_m = design.core.as_ref().map_or(0.0, |core| core.below_m);
     let top_m = -(coil.length_m + below_m) - plate.gap_m;
     let z_m = [top_m - plate.thickness_m, top_m];
