@@ -1,7 +1,9 @@
 //! A design as a drawing of its array.
 
+use crate::design::iron::{Plate, PlateOutline};
 use crate::design::{Coil, Design};
 use crate::plot::array::{ArrayPlot, Body, Part, Role};
+use crate::scene::iron::middle;
 
 /// The array of `design` with its coils, the magnet and the workspace; `None` without a coil.
 #[must_use]
@@ -18,6 +20,12 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
     for (number, axis_m) in axes.iter().enumerate() {
         parts.extend(coil_parts(design, &coil, *axis_m, number));
     }
+    parts.extend(
+        design
+            .plate
+            .as_ref()
+            .map(|plate| part(Role::Plate, plate_body(design, &coil, plate))),
+    );
     let (half, centre) = (0.5 * design.magnet.length_m, design.target_height_m);
     parts.push(part(
         Role::Magnet,
@@ -33,6 +41,29 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
         parts,
         section_y_m: middle[1],
     })
+}
+
+/// The plate, its middle below the middle of the coils' axes.
+fn plate_body(design: &Design, coil: &Coil, plate: &Plate) -> Body {
+    let middle = middle(&design.array.positions_m);
+    let below_m = design.core.as_ref().map_or(0.0, |core| core.below_m);
+    let top_m = -(coil.length_m + below_m) - plate.gap_m;
+    let z_m = [top_m - plate.thickness_m, top_m];
+    match plate.outline {
+        PlateOutline::Round(diameter_m) => Body::Tube {
+            axis_m: middle,
+            inner_m: 0.0,
+            outer_m: 0.5 * diameter_m,
+            z_m,
+        },
+        PlateOutline::Rectangle(sides_m) => {
+            let ends = |k: usize| {
+                let half = 0.5 * sides_m[k];
+                [middle[k] - half, middle[k] + half]
+            };
+            Body::Block([ends(0), ends(1), z_m])
+        }
+    }
 }
 
 fn part(role: Role, body: Body) -> Part {

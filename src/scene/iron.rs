@@ -272,7 +272,7 @@ fn meets(a: &Body, b: &Body, least_m: f64) -> bool {
     of(a, b) || of(b, a)
 }
 
-fn middle(axes: &[[f64; 2]]) -> [f64; 2] {
+pub(super) fn middle(axes: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|axis| {
         let ends = axes
             .iter()

@@ -25,6 +25,8 @@ pub enum Role {
     Workspace,
     /// Turns of wire.
     Winding,
+    /// Steel below the coils.
+    Plate,
     /// Steel inside a winding.
     Core,
     /// The finger's magnet.
@@ -42,12 +44,19 @@ struct Look {
 
 impl Role {
     /// All of them, as they are drawn: later ones over earlier ones.
-    const ALL: [Self; 4] = [Self::Workspace, Self::Winding, Self::Core, Self::Magnet];
+    const ALL: [Self; 5] = [
+        Self::Workspace,
+        Self::Plate,
+        Self::Winding,
+        Self::Core,
+        Self::Magnet,
+    ];
 
     const fn look(self) -> Look {
         let (name, class, fill, stroke, dashed) = match self {
             Self::Workspace => ("workspace", "workspace", None, "#0072b2", true),
             Self::Winding => ("winding", "winding", Some("#e6a15c"), "#8a4b08", false),
+            Self::Plate => ("steel plate", "plate", Some("#c3c9cf"), "#49525c", false),
             Self::Core => ("steel core", "core", Some("#9aa3ad"), "#49525c", false),
             Self::Magnet => ("magnet", "magnet", Some("#d98cb3"), "#8f3f6b", false),
         };
