@@ -3,8 +3,10 @@
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use super::reader::{Located, Section};
-use super::rule::{BODY_MM, Bound, OFFSET_MM, Rule};
-use super::sections::{LOW_CARBON_KNEE_T, RELATIVE_PERMEABILITY, RELATIVE_PERMEABILITY_DEFAULT};
+use super::rule::{
+    BODY_MM, Bound, LOW_CARBON_KNEE_T, OFFSET_MM, RELATIVE_PERMEABILITY,
+    RELATIVE_PERMEABILITY_DEFAULT, Rule,
+};
 use fluxform_base::units::m_from_mm;
 
 /// Linear steel.

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::diagnostics::Fault;
 use super::message_text::{number, quantity, twelve_digits};
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// The values a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -239,3 +240,16 @@ pub(crate) const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
 /// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
 /// conductor is named, it is taken as the diameter over the insulation too.
 pub(crate) const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
+
+/// Relative permeabilities, from vacuum to beyond any metal. The slips: mu itself in H/m, and thousands.
+pub(crate) const RELATIVE_PERMEABILITY: Rule =
+    Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
+        slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
+        slip(0.125, 1.0, "thousands", 1000.0),
+    ]);
+
+/// Relative permeability of the reference design's steel.
+pub(crate) const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
+
+/// Knee of low-carbon steel that is described by its permeability alone, T.
+pub(crate) const LOW_CARBON_KNEE_T: f64 = 1.5;

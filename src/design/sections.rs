@@ -7,7 +7,10 @@ use super::array::{COILS_MAX, grid_positions_m};
 use super::message_text::number;
 use super::model::{ArrayGrid, Coupling, Driver, MagnetModel, Polarity};
 use super::reader::{Located, Section};
-use super::rule::{BODY_MM, Bound, MAGNET_MM, OFFSET_MM, Rule, WIRE_MM, slip};
+use super::rule::{
+    BODY_MM, Bound, LOW_CARBON_KNEE_T, MAGNET_MM, OFFSET_MM, RELATIVE_PERMEABILITY,
+    RELATIVE_PERMEABILITY_DEFAULT, Rule, WIRE_MM, slip,
+};
 use super::values::OneOrMany;
 use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
@@ -15,12 +18,6 @@ use fluxform_numerics::axis::Axis;
 
 /// Absolute zero, C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
-
-/// Knee of low-carbon steel that is described by its permeability alone, T.
-pub(super) const LOW_CARBON_KNEE_T: f64 = 1.5;
-
-/// Relative permeability of the reference design's steel.
-pub(super) const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -39,12 +36,6 @@ const MAGNETIZATION_A_PER_M: Rule = Rule::any("A/m").slips(&[
 const CONDUCTIVITY_S_PER_M: Rule = Rule::any("S/m")
     .bound(Bound::NotNegative)
     .slips(&[slip(0.0, 1000.0, "MS/m", 1e6)]);
-/// From vacuum to beyond any metal. The slips: mu itself in H/m, and thousands.
-pub(super) const RELATIVE_PERMEABILITY: Rule =
-    Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
-        slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
-        slip(0.125, 1.0, "thousands", 1000.0),
-    ]);
 const AMPERE: Rule = Rule::any("A");
 const BANDWIDTH_HZ: Rule = Rule::any("Hz");
 

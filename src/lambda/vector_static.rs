@@ -175,44 +175,11 @@ pub fn vector_static(
 
 /// Lawson's weights over stacked rows, from the currents given.
 fn worst_vector(rows: &ForceProblem, lambda: f64, start_a: &[f64]) -> WorstVector {
-    let coils = rows.coils();
-    let points = rows.height_m.len() / 3;
-    let wanted =
-        |row: usize| lambda * rows.height_m[row] - rows.offset_n.map_or(0.0, |all| all[row]);
-    let force = |row: usize| &rows.forces_n_per_a[row * coils..(row + 1) * coils];
-    let errors = |currents: &[f64]| -> Vec<f64> {
-        let square = |row: usize| {
-            let given: f64 = force(row).iter().zip(currents).map(|(g, i)| g * i).sum();
-            (given - wanted(row)).powi(2)
-        };
-        let length = |point: usize| {
-            (0..3)
-                .map(|axis| square(axis * points + point))
-                .sum::<f64>()
-                .sqrt()
-        };
-        (0..points).map(length).collect()
-    };
-    let longest = |errors: &[f64]| {
-        let pairs = errors.iter().copied().enumerate();
-        pairs.fold(
-            (0, 0.0),
-            |most, one| if one.1 > most.1 { one } else { most },
-        )
-    };
-    let largest = rows
-        .forces_n_per_a
-        .iter()
-        .fold(0.0_f64, |most, g| most.max(g.abs()));
-    let least_ohm = rows
-        .resistance_ohm
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min);
-    let price = (PRICE * largest * largest / least_ohm).max(f64::MIN_POSITIVE);
+    let vectors = Vectors::new(rows, lambda);
+    let (points, coils) = (vectors.points, rows.coils());
     let mut currents = start_a.to_vec();
-    let mut of_points = errors(&currents);
-    let (point, worst_error_n) = longest(&of_points);
+    let mut errors = vectors.errors_n(&currents);
+    let (point, worst_error_n) = longest(&errors);
     let mut best = WorstVector {
         at_least_n: 0.0,
         worst_error_n,
@@ -223,37 +190,17 @@ fn worst_vector(rows: &ForceProblem, lambda: f64, start_a: &[f64]) -> WorstVecto
     let turns = (WORK / (3 * points * coils * coils).max(1)).clamp(4, TURNS);
     for _ in 0..turns {
         fluxform_base::progress::poll();
-        let total: f64 = weights.iter().zip(&of_points).map(|(w, e)| w * e).sum();
+        let total: f64 = weights.iter().zip(&errors).map(|(w, e)| w * e).sum();
         if total <= 0.0 {
             break;
         }
-        for (weight, error) in weights.iter_mut().zip(&of_points) {
+        for (weight, error) in weights.iter_mut().zip(&errors) {
             *weight *= error / total;
         }
-        let mut form = ErrorForm::new(coils);
-        for row in 0..3 * points {
-            let weight = weights[row % points];
-            if weight > 0.0 {
-                form.add_square(force(row), weight, 0.0);
-                form.add_target(force(row), wanted(row), 1.0, weight);
-            }
-        }
-        form.minimise(rows, price, &mut currents);
-        let power: f64 = rows
-            .resistance_ohm
-            .iter()
-            .zip(&currents)
-            .map(|(r, i)| r * i * i)
-            .sum();
-        // The least of error and priced power, less what power could be worth to others: their limits'.
-        let most_w: f64 = (rows.resistance_ohm.iter())
-            .zip(rows.lower_a.iter().zip(rows.upper_a))
-            .map(|(r, (l, u))| r * (l * l).max(u * u))
-            .sum();
-        let square = form.value(&currents) + price * (power - most_w);
+        let square = vectors.minimise(&weights, &mut currents);
         best.at_least_n = best.at_least_n.max(square.max(0.0).sqrt());
-        of_points = errors(&currents);
-        let (point, error) = longest(&of_points);
+        errors = vectors.errors_n(&currents);
+        let (point, error) = longest(&errors);
         if error < best.worst_error_n {
             best.worst_error_n = error;
             best.currents_a.copy_from_slice(&currents);
@@ -264,4 +211,83 @@ fn worst_vector(rows: &ForceProblem, lambda: f64, start_a: &[f64]) -> WorstVecto
         }
     }
     best
+}
+
+/// The point of the largest error, and the error.
+fn longest(errors_n: &[f64]) -> (usize, f64) {
+    let pairs = errors_n.iter().copied().enumerate();
+    pairs.fold(
+        (0, 0.0),
+        |most, one| if one.1 > most.1 { one } else { most },
+    )
+}
+
+/// Stacked rows as one force vector a point, at one lambda.
+struct Vectors<'a> {
+    rows: &'a ForceProblem<'a>,
+    lambda: f64,
+    points: usize,
+    /// Of a watt, N^2/W.
+    price: f64,
+    /// What all coils at their limits take, W.
+    most_w: f64,
+}
+
+impl<'a> Vectors<'a> {
+    fn new(rows: &'a ForceProblem<'a>, lambda: f64) -> Self {
+        let largest = (rows.forces_n_per_a.iter()).fold(0.0_f64, |most, g| most.max(g.abs()));
+        let least_ohm = (rows.resistance_ohm.iter().copied()).fold(f64::INFINITY, f64::min);
+        let limits = rows.lower_a.iter().zip(rows.upper_a);
+        Self {
+            rows,
+            lambda,
+            points: rows.height_m.len() / 3,
+            price: (PRICE * largest * largest / least_ohm).max(f64::MIN_POSITIVE),
+            most_w: (rows.resistance_ohm.iter().zip(limits))
+                .map(|(r, (l, u))| r * (l * l).max(u * u))
+                .sum(),
+        }
+    }
+
+    fn requested_n(&self, row: usize) -> f64 {
+        let offset_n = self.rows.offset_n.map_or(0.0, |all| all[row]);
+        self.lambda * self.rows.height_m[row] - offset_n
+    }
+
+    fn force_n_per_a(&self, row: usize) -> &[f64] {
+        let coils = self.rows.coils();
+        &self.rows.forces_n_per_a[row * coils..(row + 1) * coils]
+    }
+
+    /// Length of the error at every point.
+    fn errors_n(&self, currents_a: &[f64]) -> Vec<f64> {
+        let square = |row: usize| {
+            let pairs = self.force_n_per_a(row).iter().zip(currents_a);
+            let given: f64 = pairs.map(|(g, i)| g * i).sum();
+            (given - self.requested_n(row)).powi(2)
+        };
+        let length = |point: usize| {
+            let axes = (0..3).map(|axis| square(axis * self.points + point));
+            axes.sum::<f64>().sqrt()
+        };
+        (0..self.points).map(length).collect()
+    }
+
+    /// Sets the currents of the least weighted square error; gives a lower bound of the largest square
+    /// error of any currents: the least of error and priced power, less what that power could be worth
+    /// to others, their limits'.
+    fn minimise(&self, weights: &[f64], currents_a: &mut [f64]) -> f64 {
+        let mut form = ErrorForm::new(self.rows.coils());
+        for row in 0..3 * self.points {
+            let weight = weights[row % self.points];
+            if weight > 0.0 {
+                form.add_square(self.force_n_per_a(row), weight, 0.0);
+                form.add_target(self.force_n_per_a(row), self.requested_n(row), 1.0, weight);
+            }
+        }
+        form.minimise(self.rows, self.price, currents_a);
+        let taken = self.rows.resistance_ohm.iter().zip(&*currents_a);
+        let power_w: f64 = taken.map(|(r, i)| r * i * i).sum();
+        form.value(currents_a) + self.price * (power_w - self.most_w)
+    }
 }

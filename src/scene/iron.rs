@@ -2,7 +2,6 @@
 
 use super::Scene;
 use super::core_material::{Material, SceneCore};
-use super::steel::Solved;
 use crate::RunError;
 use crate::design::iron::{Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::{Coupling, Design};
@@ -188,17 +187,6 @@ impl SceneIron {
         })
     }
 
-    /// The largest |B| of `solved` at these currents, in it and in the cores.
-    ///
-    /// # Errors
-    /// A solution without it; a place on a winding's edge.
-    pub fn peaks(&self, solved: &Solved, currents_a: &[f64]) -> Result<IronPeaks, RunError> {
-        let array = solved.steel().iron();
-        let array =
-            array.ok_or_else(|| RunError::Input("the solution holds no steel".to_owned()))?;
-        Ok(array.peaks(currents_a, self.depth_m())?)
-    }
-
     /// Warnings about steel above its knee, where linear steel ends.
     #[must_use]
     pub fn above_knee(&self, scene: &Scene, peaks: &IronPeaks, at: &str) -> Vec<String> {
@@ -220,7 +208,7 @@ impl SceneIron {
     }
 
     /// How far inside its surface the largest |B| is looked for, m.
-    fn depth_m(&self) -> f64 {
+    pub(super) fn depth_m(&self) -> f64 {
         let plate = self.plate.map(|plate| plate.body());
         let bodies = self.bodies.iter().map(|(body, _)| *body).chain(plate);
         bodies.fold(DEPTH_M, |depth, body| depth.min(DEPTH_PART * size_m(&body)))

@@ -150,10 +150,8 @@ pub(crate) fn array(
             "a core of the array with all coils at their rated currents",
         ));
     }
-    let peaks = (scene.iron.as_ref())
-        .map(|iron| iron.peaks(&solved, &scene.upper_a))
-        .transpose()?;
-    let iron = peaks.and_then(|peaks| {
+    let iron = solved.iron_peaks(scene, &scene.upper_a)?;
+    let iron = iron.and_then(|peaks| {
         peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
         iron_summary(scene, &matrix, &peaks, warnings)
     });

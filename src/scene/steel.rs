@@ -9,7 +9,7 @@ use super::iron::SceneIron;
 use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
-use crate::field::iron::array::IronArray;
+use crate::field::iron::array::{IronArray, IronPeaks};
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
@@ -105,6 +105,21 @@ impl Solved {
         } else {
             solve(scene, scene.tolerances.forces, lowest_m)
         }
+    }
+
+    /// The largest |B| in the plate and other bodies and in the cores at these currents; `None` where steel is cores alone.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn iron_peaks(
+        &self,
+        scene: &Scene,
+        currents_a: &[f64],
+    ) -> Result<Option<IronPeaks>, RunError> {
+        let (Some(iron), Some(array)) = (&scene.iron, self.steel().iron()) else {
+            return Ok(None);
+        };
+        Ok(Some(array.peaks(currents_a, iron.depth_m())?))
     }
 
     /// How [`Solved::steel_error`] is known; `None` without steel.

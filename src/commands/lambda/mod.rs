@@ -479,8 +479,9 @@ impl PosedProblem<'_> {
     /// Warnings about the cores, at the chosen currents if there are any.
     fn core_warnings(&self, solution: &Solution) -> Result<Vec<String>, RunError> {
         if let (Some(iron), Some(chosen)) = (&self.scene.iron, &solution.chosen) {
-            let peaks = iron.peaks(self.solved, &chosen.currents_a)?;
-            return Ok(iron.above_knee(self.scene, &peaks, "the chosen currents"));
+            let peaks = self.solved.iron_peaks(self.scene, &chosen.currents_a)?;
+            let above = |peaks| iron.above_knee(self.scene, &peaks, "the chosen currents");
+            return Ok(peaks.map(above).unwrap_or_default());
         }
         let Some(core) = &self.scene.core else {
             return Ok(Vec::new());

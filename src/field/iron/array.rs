@@ -4,15 +4,12 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::bodies::{Coils, Iron};
+use super::bodies::{Coils, Iron, SAME_M};
 use super::face::{Node, Point};
 use super::surface::{Surface, mirrored};
 use super::system::System;
 use crate::components::Components;
 use crate::frame::to_cartesian;
-use crate::source::AxialSource;
-use crate::steel::array::CoupledArray;
-use crate::steel::array_steel::{ArraySteel, DirectField, SteelField};
 use crate::steel::equivalent_dipoles::ArraySources;
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -34,9 +31,6 @@ const MOST_ENTRIES: usize = 200_000_000;
 const SOLVER_SHARE: f64 = 0.02;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
-
-/// How the error of a solution is known.
-pub const TWO_OF_IRON: &str = "the difference of two resolutions of the steel's surface";
 
 /// The solved steel, per ampere of every winding.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -294,42 +288,6 @@ impl IronArray {
     }
 }
 
-impl ArraySteel for IronArray {
-    fn is_present(&self) -> bool {
-        true
-    }
-
-    fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
-        self.added_inductance_h[(i, j)]
-    }
-
-    fn axial_source(&self, _: Winding, _: f64) -> Option<Box<dyn AxialSource>> {
-        None
-    }
-
-    fn direct(&self, _: &Winding) -> Option<(DirectField<'_>, &'static str)> {
-        None
-    }
-
-    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
-        Some(SteelField::Coupled(
-            self.sources(lowest_m, distance_m, tolerance),
-        ))
-    }
-
-    fn method(&self) -> Option<&'static str> {
-        Some(TWO_OF_IRON)
-    }
-
-    fn coupled(&self) -> Option<&CoupledArray> {
-        None
-    }
-
-    fn iron(&self) -> Option<&IronArray> {
-        Some(self)
-    }
-}
-
 /// The potential of the windings `firsts` at every node of one mirrored copy, [node, winding].
 fn potentials(
     surface: &Surface,
@@ -386,9 +344,6 @@ fn drives(positions_m: &[[f64; 2]], images: &[[f64; 2]], planes_m: [f64; 2]) -> 
     }
     out
 }
-
-/// Places closer than that are one, m.
-pub(super) const SAME_M: f64 = 1e-9;
 
 fn apart_m(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])

@@ -2,11 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::array::SAME_M;
 use super::face::{Curve, Face, Point, Resolution};
 use crate::steel::CoreShape;
 use crate::winding::Winding;
 use fluxform_numerics::vec3::{dot, minus, plus};
+
+/// Places closer than that are one, m.
+pub(super) const SAME_M: f64 = 1e-9;
 
 /// A point far out along a direction from another, m.
 fn beyond(at: Point, along: Point) -> Point {

@@ -107,6 +107,8 @@ pub struct AloneCore {
 pub const TWO_OF_ONE_CORE: &str = "twice the difference of two resolutions of the core's surface";
 /// The same of cores that magnetise each other.
 pub const TWO_OF_COUPLED_CORES: &str = "the difference of two resolutions of the coupled cores";
+/// The same of steel of any shape.
+pub const TWO_OF_IRON_SURFACES: &str = "the difference of two resolutions of the steel's surface";
 /// The same of one core along a B-H curve.
 pub const ALONG_CURVE: &str = "the larger difference among three resolutions of the core's \
                                surface and inside, times a safety factor";
@@ -176,6 +178,42 @@ impl ArraySteel for CoupledArray {
     }
 
     fn coupled(&self) -> Option<&CoupledArray> {
+        Some(self)
+    }
+}
+
+impl ArraySteel for IronArray {
+    fn is_present(&self) -> bool {
+        true
+    }
+
+    fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
+        self.added_inductance_h[(i, j)]
+    }
+
+    fn axial_source(&self, _: Winding, _: f64) -> Option<Box<dyn AxialSource>> {
+        None
+    }
+
+    fn direct(&self, _: &Winding) -> Option<(DirectField<'_>, &'static str)> {
+        None
+    }
+
+    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
+        Some(SteelField::Coupled(
+            self.sources(lowest_m, distance_m, tolerance),
+        ))
+    }
+
+    fn method(&self) -> Option<&'static str> {
+        Some(TWO_OF_IRON_SURFACES)
+    }
+
+    fn coupled(&self) -> Option<&CoupledArray> {
+        None
+    }
+
+    fn iron(&self) -> Option<&Self> {
         Some(self)
     }
 }
