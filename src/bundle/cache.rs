@@ -25,14 +25,14 @@ const DIGEST: usize = 32;
 const ENTRY_MAX_BYTES: u64 = 16 << 30;
 
 /// Digest of the inputs of a value.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Origin(Sha256);
 
 impl Origin {
     /// The origin of what the build of this name computes with the present vector instructions.
     #[must_use]
     pub fn of_build(build: &str) -> Self {
-        Self(Sha256::new())
+        Self::default()
             .and(build.as_bytes())
             .and(dispatch::instructions().as_bytes())
     }
@@ -55,13 +55,6 @@ impl Origin {
         }
         self.0.update(count.to_le_bytes());
         self
-    }
-
-    /// A short name for an entry that is shared by all who ask for this origin: eight hexadecimal digits.
-    #[must_use]
-    pub fn short_name(&self) -> String {
-        let first = self.sum().into_iter().take(4);
-        first.map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// The digest of all that was added.

@@ -283,9 +283,10 @@ impl<'a> ShapeField<'a> {
                 origin.and_numbers(nodes.iter().copied())
             })
         };
-        // Objects as wide and as high have the same map; another design's takes its place.
-        let kind = Origin::of_build(components.name());
-        let name = format!("map-{}", of_grid(kind).short_name());
+        // Objects as wide and as high have the same map; another design's or processor's takes its
+        // place, and there are never more than 256.
+        let kind = Origin::default().and(components.name().as_bytes());
+        let name = format!("map-{:02x}", of_grid(kind).sum()[0]);
         let origin = of_grid(field.clone().and(what.as_bytes()));
         let sum = origin.sum();
         let mut last = last_map.lock().unwrap_or_else(PoisonError::into_inner);
