@@ -8,7 +8,7 @@ use fluxform_base::progress::Interrupted;
 use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::descent::Judged;
-use fluxform_numerics::mixed_search::{Problem, Variable};
+use fluxform_numerics::mixed_search::{MET, Problem, Variable};
 
 use super::positions::closest;
 use super::space::{Axis, Space};
@@ -121,8 +121,16 @@ impl Bounded {
         };
         if self.at_least { -over } else { over }
     }
+
+    /// Whether it is met, up to the rounding of places and lengths.
+    #[must_use]
+    pub fn is_met(&self) -> bool {
+        self.excess() <= ROUNDING
+    }
 }
 
+/// Relative rounding of places and lengths, several operations long.
+const ROUNDING: f64 = 1e-12;
 /// What the search stays below limits that are not whole lengths of wire: lengths are rounded later.
 const MARGIN: f64 = 3e-5;
 /// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
@@ -140,6 +148,8 @@ pub struct ArrayProblem<'a> {
     reference_ln: Vec<f64>,
     /// Height, m, below which nothing of the array may reach where the shapes are not raised.
     ceiling_m: f64,
+    /// Limits of the coil that all designs of the space meet or break alike: no part of the search.
+    unchanged: Vec<&'static str>,
     /// What full accuracy adds to the outputs of the search.
     correction: RwLock<Vec<f64>>,
 }
@@ -154,14 +164,30 @@ impl<'a> ArrayProblem<'a> {
         reference_n_per_m: &[f64],
         ceiling_m: f64,
     ) -> Self {
-        Self {
+        let mut problem = Self {
             space,
             physics,
             objective,
             reference_ln: reference_n_per_m.iter().map(|l| l.ln()).collect(),
             ceiling_m,
+            unchanged: Vec::new(),
             correction: RwLock::default(),
+        };
+        problem.unchanged = problem.unchanged_limits();
+        problem
+    }
+
+    fn unchanged_limits(&self) -> Vec<&'static str> {
+        if self.space.is_wound() {
+            return Vec::new();
         }
+        let ends: [fn(&Variable) -> f64; 2] = [|variable| variable.low, |variable| variable.high];
+        let [low, high] = ends.map(|end| {
+            let x: Vec<f64> = self.space.variables().iter().map(end).collect();
+            Self::of_table(&self.space.design(&x), None)
+        });
+        let unchanged = low.iter().filter(|bound| high.contains(bound));
+        unchanged.map(|bound| bound.key).collect()
     }
 
     fn corrected(&self, outputs: &[f64]) -> Vec<f64> {
@@ -247,9 +273,16 @@ impl<'a> ArrayProblem<'a> {
     #[must_use]
     pub fn bounds(&self, x: &[f64], physical: Option<&Physical>) -> Vec<Bounded> {
         let design = self.space.design(x);
-        let Some((circuit, mass_kg)) =
-            Self::coil(&design, physical.map_or(f64::NAN, |p| p.inductance_h))
-        else {
+        let mut all = Self::of_table(&design, physical);
+        all.retain(|bound| !self.unchanged.contains(&bound.key));
+        self.add_geometry(x, &design, &mut all);
+        all
+    }
+
+    /// Those that the design's [limits] hold.
+    fn of_table(design: &Design, physical: Option<&Physical>) -> Vec<Bounded> {
+        let inductance_h = physical.map_or(f64::NAN, |p| p.inductance_h);
+        let Some((circuit, mass_kg)) = Self::coil(design, inductance_h) else {
             return Vec::new();
         };
         let most_a = design
@@ -260,7 +293,7 @@ impl<'a> ArrayProblem<'a> {
             .fold(0.0, f64::max);
         let rated_a = circuit.rated_current_a(most_a, design.supply.voltage_v);
         let at = Evaluated {
-            design: &design,
+            design,
             circuit: &circuit,
             power_w: circuit.power_w(rated_a),
             mass_kg,
@@ -281,9 +314,7 @@ impl<'a> ArrayProblem<'a> {
                 scale: None,
             })
         });
-        let mut all: Vec<Bounded> = of_design.filter(|bound| bound.value.is_finite()).collect();
-        self.add_geometry(x, &design, &mut all);
-        all
+        of_design.filter(|bound| bound.value.is_finite()).collect()
     }
 
     fn add_geometry(&self, x: &[f64], design: &Design, all: &mut Vec<Bounded>) {
@@ -317,9 +348,23 @@ impl<'a> ArrayProblem<'a> {
             ];
             for (key, value, [low, high]) in ranges {
                 // Whole lengths of wire are exact up to rounding.
-                add(key, None, value, high * (1.0 + MARGIN + 1e-12), false, None);
+                add(
+                    key,
+                    None,
+                    value,
+                    high * (1.0 + MARGIN + ROUNDING),
+                    false,
+                    None,
+                );
                 if low > 0.0 {
-                    add(key, None, value, low * (1.0 - MARGIN - 1e-12), true, None);
+                    add(
+                        key,
+                        None,
+                        value,
+                        low * (1.0 - MARGIN - ROUNDING),
+                        true,
+                        None,
+                    );
                 }
             }
             if design.limits.inner_diameter_min_m.is_none() {
@@ -365,13 +410,20 @@ impl<'a> ArrayProblem<'a> {
         );
     }
 
-    /// Whether a search would come nearer to its limit than rounding goes.
-    fn margin(bound: &Bounded) -> f64 {
+    /// By how much a search must stay below a limit, or above it.
+    fn margin(&self, bound: &Bounded) -> f64 {
         match bound.name {
+            // What is not wound is not rounded, and may be at its limit as given.
+            _ if !self.space.is_wound() => MET,
             // Whole wires meet it exactly.
-            Some(LimitName::Length) => -1e-12,
+            Some(LimitName::Length) => -ROUNDING,
             _ => MARGIN,
         }
+    }
+
+    /// Whether the search takes a design for one that breaks this limit.
+    pub(super) fn breaks(&self, bound: &Bounded) -> bool {
+        bound.excess() + self.margin(bound) > MET
     }
 
     /// Objective and limits from bounds that are known.
@@ -381,7 +433,7 @@ impl<'a> ArrayProblem<'a> {
             objectives: self.objectives(physical),
             limits: bounds
                 .iter()
-                .map(|bound| bound.excess() + Self::margin(bound))
+                .map(|bound| bound.excess() + self.margin(bound))
                 .collect(),
         }
     }

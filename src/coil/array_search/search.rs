@@ -60,7 +60,7 @@ impl Candidate {
     /// Whether every limit is met.
     #[must_use]
     pub fn is_feasible(&self) -> bool {
-        self.bounds.iter().all(|bound| bound.excess() <= 0.0)
+        self.bounds.iter().all(Bounded::is_met)
     }
 }
 
@@ -132,7 +132,7 @@ fn problem<'a>(
         return Ok(problem);
     }
     let bounds = problem.bounds(&x, None);
-    let broken: Vec<&Bounded> = bounds.iter().filter(|b| b.excess() > 0.0).collect();
+    let broken: Vec<&Bounded> = bounds.iter().filter(|b| problem.breaks(b)).collect();
     let named: Vec<String> = broken
         .iter()
         .map(|b| described(b.key, b.limit, b.at_least))

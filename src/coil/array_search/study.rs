@@ -234,7 +234,7 @@ impl View<'_, '_> {
                 key: bound.key,
                 value: bound.value,
                 limit: bound.limit,
-                met: bound.excess() <= 0.0,
+                met: bound.is_met(),
                 active: multiplier > ACTIVE,
                 gain_per_unit: if multiplier > ACTIVE {
                     multiplier * bound.per_unit()
@@ -405,7 +405,7 @@ impl View<'_, '_> {
             let bounds = problem.bounds(&sample.x, Some(&physical));
             let met_but = TRADED.map(|(_, name)| {
                 let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
-                others.all(|bound| bound.excess() <= 0.0)
+                others.all(Bounded::is_met)
             });
             let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
             let [Some(mass), Some(power), Some(settling)] = costs else {
@@ -415,7 +415,7 @@ impl View<'_, '_> {
             Some(TradedDesign {
                 objective: judged.objective().exp(),
                 costs: [mass, power, settling],
-                met: bounds.iter().all(|bound| bound.excess() <= 0.0),
+                met: bounds.iter().all(Bounded::is_met),
                 met_but,
                 values: self.named(&sample.x),
             })

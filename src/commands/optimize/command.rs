@@ -35,9 +35,9 @@ use crate::design::Need;
      "one that can be wound, as a design"),
     ("fluxform optimize designs/seed_air.toml --fix inner_diameter_mm --format json",
      "with the bore as it is, for a program"),
-    ("fluxform optimize designs/seed.toml --for shapes/flat.toml shapes/wedge.toml --vary array.pitch_mm=40:60",
-     "the array whose pitch is felt best over two shapes"),
-]))]
+    ("fluxform optimize designs/seed_air.toml --for shapes/flat.toml --vary coil.length_mm=60:90",
+     "the array that is felt best over a plane, of coils 60 to 90 mm long"),
+]), mut_arg("unit", |unit| unit.hide_short_help(true)))]
 pub struct Optimize {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
@@ -47,7 +47,7 @@ pub struct Optimize {
     wound: bool,
     /// Among the array's other coils: their unpowered cores count for force and settling of the
     /// coil nearest to the centre, where the design couples them
-    #[arg(long, conflicts_with = "shapes")]
+    #[arg(long, hide_short_help = true, conflicts_with = "shapes")]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
     /// [default: 24; with --for 3]
@@ -57,7 +57,7 @@ pub struct Optimize {
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
-    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
+    #[arg(long, hide_short_help = true, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
     fix: Vec<Key>,
     /// Boxes of coils that proving the best may take; 0 for no proof
     #[arg(

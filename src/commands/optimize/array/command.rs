@@ -51,7 +51,7 @@ pub struct ArrayFlags {
     /// Write the trade-offs against mass, heat and settling here (CSV)
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
-    /// Draw them here (SVG)
+    /// Draw them here (SVG, PNG or PDF)
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub plot: Option<FileArgument>,
     /// Keep every array that is computed in this file, and take from it those of an earlier run

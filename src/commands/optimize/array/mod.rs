@@ -164,23 +164,27 @@ fn result(
     };
     let (design_text, best) = written(document, found)?;
     let mut warnings = Vec::new();
-    let (limits, limits_met) = match found.interrupted {
-        // Nothing more is computed then.
-        true => (
-            BTreeMap::new(),
-            bounds.iter().all(|bound| bound.excess() <= 0.0),
-        ),
-        false => {
-            let evaluation = evaluate(&best, Vec::new(), request.tolerance)?;
-            let met = evaluation.limits_met();
-            warnings.extend(evaluation.warnings);
-            (evaluation.limits, met)
+    // After an interruption nothing more is computed.
+    let (mut limits, mut limits_given) = (BTreeMap::new(), BTreeMap::new());
+    let mut limits_met = bounds.iter().all(|bound| bound.is_met());
+    if !found.interrupted {
+        let evaluation = evaluate(&best, Vec::new(), request.tolerance)?;
+        warnings.extend(evaluation.warnings);
+        limits = evaluation.limits;
+        limits_given = evaluate(document.design, Vec::new(), request.tolerance)?.limits;
+        let missed = limits.iter().filter(|(_, check)| !check.met);
+        let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
+            (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
+        });
+        limits_met = broken.is_empty();
+        let keys: Vec<&str> = unchanged.iter().map(|(key, _)| key.as_ref()).collect();
+        if !keys.is_empty() {
+            warnings.push(format!(
+                "{}: missed by the given design, and nothing that is searched changes it",
+                keys.join(", ")
+            ));
         }
-    };
-    let limits_given = match found.interrupted {
-        true => BTreeMap::new(),
-        false => evaluate(document.design, Vec::new(), request.tolerance)?.limits,
-    };
+    }
     let status = match (found.interrupted, limits_met) {
         (true, _) => ArrayEnding::Interrupted,
         (false, true) => ArrayEnding::Done,
