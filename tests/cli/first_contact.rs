@@ -37,8 +37,8 @@ fn every_key_of_design_and_shape_is_listed() {
         magnet.contains("-180 to 180") && !magnet.contains("[coil]"),
         "{magnet}"
     );
-    let tilt = place.run(&["keys", "tilt"]).ends(0).out;
-    assert_eq!(tilt.lines().count(), 2, "{tilt}");
+    let volts = place.run(&["keys", "voltage"]).ends(0).out;
+    assert_eq!(volts.lines().count(), 2, "{volts}");
     place
         .run(&["keys", "magnets"])
         .ends(2)

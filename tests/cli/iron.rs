@@ -165,7 +165,7 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
     );
     refused(
         &place,
-        &box_at("[5, 5, 5]", "[16.5, 0, 2]"),
+        &box_at("[5, 5, 5]", "[25, 0, 2.53]"),
         &["[[iron]] 0", "core of coil 1"],
     );
     refused(

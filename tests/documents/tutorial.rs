@@ -21,7 +21,7 @@ const TUTORIAL: &str = "designs/first_display.md";
 
 /// A folder with the repository's scripts, designs and shapes.
 fn place() -> Place {
-    Place::with(&["scripts", "designs", "shapes"])
+    Place::with(&["scripts", "designs", "shapes", "src"])
 }
 
 /// A program that a block of the tutorial needs.

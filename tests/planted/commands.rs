@@ -109,6 +109,7 @@ pub const COMMANDS: &[Writes] = &[
             "replay bundles/air/bump --synthesize circle --duration 1 --trajectory-out out/made.csv --out out/replay.csv",
         )
     },
+    writes("evaluate", "evaluate air.toml --plot out/array.svg"),
     writes(
         "compare",
         "compare air.toml bump.toml knob.toml --plot out/compare.svg",

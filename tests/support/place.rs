@@ -69,7 +69,11 @@ impl Place {
     /// Writes a file, and the folders it is in.
     pub fn write(&self, name: &str, content: &(impl AsRef<[u8]> + ?Sized)) {
         let path = self.path(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let parent = path.parent().unwrap();
+        fs::create_dir_all(parent).unwrap();
+        let own = parent.canonicalize().unwrap();
+        let root = self.root().canonicalize().unwrap();
+        assert!(own.starts_with(root), "{name} is the repository's");
         fs::write(path, content).unwrap();
     }
 
