@@ -105,6 +105,34 @@ pub struct Bounded {
 }
 
 impl Bounded {
+    /// A value that may not exceed its limit.
+    fn at_most(key: &'static str, value: f64, limit: f64) -> Self {
+        Self {
+            key,
+            name: None,
+            value,
+            limit,
+            at_least: false,
+            scale: None,
+        }
+    }
+
+    /// A value that may not fall below its limit.
+    fn at_least(key: &'static str, value: f64, limit: f64) -> Self {
+        Self {
+            at_least: true,
+            ..Self::at_most(key, value, limit)
+        }
+    }
+
+    /// The same as a row of the table of limits.
+    fn of(self, name: LimitName) -> Self {
+        Self {
+            name: Some(name),
+            ..self
+        }
+    }
+
     /// By how much the excess falls with a unit more of the limit.
     #[must_use]
     pub fn per_unit(&self) -> f64 {
@@ -275,7 +303,8 @@ impl<'a> ArrayProblem<'a> {
         let design = self.space.design(x);
         let mut all = Self::of_table(&design, physical);
         all.retain(|bound| !self.unchanged.contains(&bound.key));
-        self.add_geometry(x, &design, &mut all);
+        self.add_winding(&design, &mut all);
+        self.add_core(x, &design, &mut all);
         all
     }
 
@@ -305,109 +334,64 @@ impl<'a> ArrayProblem<'a> {
             .filter(|row| row.name != LimitName::WindingFill);
         let of_design = rows.filter_map(|row| {
             let value = (row.value)(&at)?;
-            Some(Bounded {
-                key: row.key,
-                name: Some(row.name),
-                value,
-                limit: (row.of)(&design.limits)?,
-                at_least: row.direction == Direction::AtLeast,
-                scale: None,
-            })
+            let of = match row.direction {
+                Direction::AtLeast => Bounded::at_least,
+                Direction::AtMost | Direction::Equal => Bounded::at_most,
+            };
+            Some(of(row.key, value, (row.of)(&design.limits)?).of(row.name))
         });
         of_design.filter(|bound| bound.value.is_finite()).collect()
     }
 
-    fn add_geometry(&self, x: &[f64], design: &Design, all: &mut Vec<Bounded>) {
+    /// What decides whether the winding can be made and the coils stand beside each other.
+    fn add_winding(&self, design: &Design, all: &mut Vec<Bounded>) {
         let Some(coil) = &design.coil else { return };
-        let mut add = |key, name: Option<LimitName>, value: f64, limit: f64, at_least, scale| {
-            all.push(Bounded {
-                key,
-                name,
-                value,
-                limit,
-                at_least,
-                scale,
-            });
-        };
         if design.array.positions_m.len() > 1 {
             let apart = closest(&design.array.positions_m);
-            add(
-                "pitch_m",
-                Some(LimitName::Pitch),
-                coil.outer_diameter_m,
-                apart,
-                false,
-                None,
-            );
+            let pitch = Bounded::at_most("pitch_m", coil.outer_diameter_m, apart);
+            all.push(pitch.of(LimitName::Pitch));
         }
-        if self.space.is_wound() {
-            let [outer, length] = [coil.outer_diameter_m, coil.length_m].map(|m| m * 1e3);
-            let ranges = [
-                ("search.coil.outer_diameter_mm", outer, self.space.outer_mm),
-                ("search.coil.length_mm", length, self.space.length_mm),
-            ];
-            for (key, value, [low, high]) in ranges {
-                // Whole lengths of wire are exact up to rounding.
-                add(
-                    key,
-                    None,
-                    value,
-                    high * (1.0 + MARGIN + ROUNDING),
-                    false,
-                    None,
-                );
-                if low > 0.0 {
-                    add(
-                        key,
-                        None,
-                        value,
-                        low * (1.0 - MARGIN - ROUNDING),
-                        true,
-                        None,
-                    );
-                }
-            }
-            if design.limits.inner_diameter_min_m.is_none() {
-                let bobbin_m = bobbin_bore_m(design.wire.diameter_m);
-                add(
-                    "inner_diameter_m",
-                    Some(LimitName::InnerDiameter),
-                    coil.inner_diameter_m,
-                    bobbin_m,
-                    true,
-                    None,
-                );
+        if !self.space.is_wound() {
+            return;
+        }
+        let [outer, length] = [coil.outer_diameter_m, coil.length_m].map(|m| m * 1e3);
+        let ranges = [
+            ("search.coil.outer_diameter_mm", outer, self.space.outer_mm),
+            ("search.coil.length_mm", length, self.space.length_mm),
+        ];
+        // Whole lengths of wire are exact up to rounding.
+        let slack = MARGIN + ROUNDING;
+        for (key, value, [low, high]) in ranges {
+            all.push(Bounded::at_most(key, value, high * (1.0 + slack)));
+            if low > 0.0 {
+                all.push(Bounded::at_least(key, value, low * (1.0 - slack)));
             }
         }
-        let Some(core) = &design.core else { return };
-        let least_m = LEAST_CORE_MM * 1e-3;
+        if design.limits.inner_diameter_min_m.is_none() {
+            let bobbin_m = bobbin_bore_m(design.wire.diameter_m);
+            let bore = Bounded::at_least("inner_diameter_m", coil.inner_diameter_m, bobbin_m);
+            all.push(bore.of(LimitName::InnerDiameter));
+        }
+    }
+
+    /// What leaves a core, below the shapes.
+    fn add_core(&self, x: &[f64], design: &Design, all: &mut Vec<Bounded>) {
+        let (Some(coil), Some(core)) = (&design.coil, &design.core) else {
+            return;
+        };
+        let (least_m, room_m) = (LEAST_CORE_MM * 1e-3, ROOM_MM * 1e-3);
         let diameter_m = coil.inner_diameter_m - 2.0 * core.clearance_m;
-        add(
-            "core_diameter_m",
-            None,
-            diameter_m,
-            least_m,
-            true,
-            Some(ROOM_MM * 1e-3),
-        );
         let length_m = coil.length_m + core.above_m + core.below_m;
-        add(
-            "core_length_m",
-            None,
-            length_m,
-            least_m,
-            true,
-            Some(ROOM_MM * 1e-3),
-        );
         let ceiling_m = self.ceiling_m + self.space.raised_m(x).min(0.0) - 0.05 * diameter_m;
-        add(
-            "core_top_m",
-            None,
-            core.above_m,
-            ceiling_m,
-            false,
-            Some(ROOM_MM * 1e-3),
-        );
+        let bounds = [
+            Bounded::at_least("core_diameter_m", diameter_m, least_m),
+            Bounded::at_least("core_length_m", length_m, least_m),
+            Bounded::at_most("core_top_m", core.above_m, ceiling_m),
+        ];
+        all.extend(bounds.map(|bound| Bounded {
+            scale: Some(room_m),
+            ..bound
+        }));
     }
 
     /// By how much a search must stay below a limit, or above it.
