@@ -232,14 +232,17 @@ impl FeltForce {
         let missing = Cause::ALL
             .iter()
             .filter(|cause| causes.iter().all(|of| of.cause != **cause));
-        let not_given =
-            missing.map(|cause| format!("{}: no bound is given ([uncertainty])", cause.words()));
+        let missing: Vec<&str> = missing.map(|cause| cause.words()).collect();
+        let not_given = (!missing.is_empty())
+            .then(|| format!("{}: no bound is given ([uncertainty])", missing.join(", ")));
         let expected = study.map_or(exact, promised);
         Self {
             total: expected,
             expected,
             parts: std::iter::once(own).chain(parts).collect(),
-            not_modelled: not_given.chain(NOT_MODELLED.map(str::to_owned)).collect(),
+            not_modelled: (not_given.into_iter())
+                .chain(NOT_MODELLED.map(str::to_owned))
+                .collect(),
         }
     }
 

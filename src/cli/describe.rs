@@ -1,6 +1,6 @@
 //! Pieces of summaries that several commands print alike.
 
-use super::quantity::{count, error, length_error, mm, number, number_to, percent};
+use super::quantity::{count, error, length_error, mm, number, number_to, percent, share};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::headline::{BudgetPart, FeltForce, FeltPart, Headline};
 use crate::bundle::lambda_file::Sideways;
@@ -203,7 +203,7 @@ pub fn felt(felt: &FeltForce) -> String {
     )
 }
 
-/// The same split by cause, in the same order, and what is in none of its parts.
+/// The same split by cause, in the same order.
 pub fn felt_parts(felt: &FeltForce) -> String {
     let one = |part: &FeltPart| {
         let of = part.error;
@@ -212,11 +212,7 @@ pub fn felt_parts(felt: &FeltForce) -> String {
         format!("{} {}", part.cause.words(), shares.join(", "))
     };
     let parts: Vec<String> = felt.parts.iter().map(one).collect();
-    format!(
-        "{}\nnot modelled: {}",
-        parts.join("; "),
-        felt.not_modelled.join("; ")
-    )
+    parts.join("; ")
 }
 
 /// What uncertainties cost, which to halve first, and the setting chosen for them.
@@ -291,14 +287,6 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
         )
     }));
     Some(lines.join("\n"))
-}
-
-/// An error's share of a whole, in two digits.
-fn share(part: f64) -> String {
-    if part > 0.0 && part < 1e-5 {
-        return error(part);
-    }
-    format!("{} %", number_to(part * 100.0, 2))
 }
 
 /// The sideways force that the chosen currents and feedback leave.

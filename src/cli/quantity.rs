@@ -153,6 +153,15 @@ pub fn error(estimate: f64) -> String {
     text.replace(".0e", "e")
 }
 
+/// An error's share of a whole, in two digits.
+#[must_use]
+pub fn share(part: f64) -> String {
+    if part > 0.0 && part < 1e-5 {
+        return error(part);
+    }
+    format!("{} %", number_to(part * 100.0, 2))
+}
+
 /// A file size.
 #[must_use]
 pub fn bytes(bytes: u64) -> String {

@@ -142,7 +142,7 @@ impl Measured {
         (at.share > jnd && at.pull_n > DETECTION_THRESHOLD_N).then(|| {
             format!(
                 "the unpowered steel pulls the magnet with {} at point {}, {} of the force \
-                 wanted there, and that is left out (magnet.passive_force = false): more than the \
+                 requested there, and that is left out (magnet.passive_force = false): more than the \
                  just-noticeable {}; set it to true to count it",
                 millinewtons(at.pull_n),
                 at.point,

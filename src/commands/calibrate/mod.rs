@@ -53,6 +53,7 @@ mod page;
 pub mod plan;
 mod recorded;
 pub(crate) mod requested_force;
+mod text;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;

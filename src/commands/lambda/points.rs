@@ -11,7 +11,7 @@ use crate::lambda::limit::{self, limit_error};
 use crate::lambda::{ForceProblem, ProblemError, Settings};
 use crate::point_weights::Weights;
 
-/// Places, what is wanted there, and what is known of their error.
+/// Places, what is requested there, and what is known of their error.
 #[derive(Debug, Clone)]
 pub(crate) struct WantedPoints {
     /// Where the magnet's centre is wanted, m.

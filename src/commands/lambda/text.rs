@@ -1,6 +1,7 @@
 //! The result of `lambda` for people.
 
 use super::LambdaReport;
+use crate::bundle::headline::FeltForce;
 use crate::bundle::lambda_file::{
     AtLambda, FeedbackFile, FeedbackPlace, FeedbackShell, LambdaFile, LambdaVariant,
     TolerancePoint, TwoFingers, VectorCurrents, VectorFeedbackFile, VectorStatic,
@@ -27,9 +28,7 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
             None => describe::force_constant(file.lambda_n_per_m),
         }
     ));
-    if let Some(requested) = file.headline.as_ref().and_then(describe::requested_error) {
-        sheet.line("error", &requested);
-    }
+    let felt = headline_lines(&mut sheet, file);
     let constants = file.constants.named().into_iter().map(|one| {
         let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
         format!("{} {lambda}", one.name)
@@ -82,19 +81,26 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     let stages = file.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
-    if let Some(felt) = file
-        .headline
-        .as_ref()
-        .and_then(|headline| headline.felt.as_ref())
-    {
-        let (all, parts) = (describe::felt(felt), describe::felt_parts(felt));
-        sheet.line("finger", &format!("{all}\n{parts}"));
+    if let Some(felt) = felt {
+        sheet.line("left out", &felt.not_modelled.join("\n"));
     }
     if let Some(variants) = &file.variants {
         sheet.gap();
         sheet.raw(&table_of(variants));
     }
     sheet.finish()
+}
+
+/// What the force comes to at the finger, and what was requested of its error.
+fn headline_lines<'a>(sheet: &mut Sheet, file: &'a LambdaFile) -> Option<&'a FeltForce> {
+    let headline = file.headline.as_ref()?;
+    if let Some(requested) = describe::requested_error(headline) {
+        sheet.line("error", &requested);
+    }
+    let felt = headline.felt.as_ref()?;
+    let (all, parts) = (describe::felt(felt), describe::felt_parts(felt));
+    sheet.line("finger", &format!("{all}\n{parts}"));
+    Some(felt)
 }
 
 /// Currents and errors at the lambda of `--at`.
