@@ -19,18 +19,24 @@ use crate::winding::{AxialField, OnEdge, Winding};
 /// A new kind of steel is one more of these: forces, maps, probes and checks know this trait alone.
 pub trait ArraySteel {
     /// Whether there is any.
-    fn is_present(&self) -> bool;
+    fn is_present(&self) -> bool {
+        true
+    }
 
     /// Flux through winding `i` for one ampere in winding `j`, less that in air, H.
     fn added_inductance_h(&self, i: usize, j: usize) -> f64;
 
     /// `winding` with what answers to it as one source about its own axis, to `tolerance` relative
     /// to the largest |grad B| at a height; `None` where a coil's field has no such symmetry.
-    fn axial_source(&self, winding: Winding, tolerance: f64) -> Option<Box<dyn AxialSource>>;
+    fn axial_source(&self, _winding: Winding, _tolerance: f64) -> Option<Box<dyn AxialSource>> {
+        None
+    }
 
     /// The field of the same at one place without a table, and how it is computed; `None` where
     /// [`ArraySteel::axial_source`] is.
-    fn direct(&self, winding: &Winding) -> Option<(DirectField<'_>, &'static str)>;
+    fn direct(&self, _winding: &Winding) -> Option<(DirectField<'_>, &'static str)> {
+        None
+    }
 
     /// The field that the steel adds at places no lower than `lowest_m` and no closer to a core
     /// than `distance_m`, to `tolerance`; `None` without steel.
@@ -40,7 +46,9 @@ pub trait ArraySteel {
     fn method(&self) -> Option<&'static str>;
 
     /// Cores that magnetise each other, which only together have |B| inside.
-    fn coupled(&self) -> Option<&CoupledArray>;
+    fn coupled(&self) -> Option<&CoupledArray> {
+        None
+    }
 
     /// Whether steel answers to other windings than its own.
     fn couples(&self) -> bool {
@@ -86,10 +94,6 @@ impl ArraySteel for NoSteel {
     fn method(&self) -> Option<&'static str> {
         None
     }
-
-    fn coupled(&self) -> Option<&CoupledArray> {
-        None
-    }
 }
 
 /// Cores each of which answers to its own winding alone; all are alike.
@@ -114,10 +118,6 @@ pub const ALONG_CURVE: &str = "the larger difference among three resolutions of 
                                surface and inside, times a safety factor";
 
 impl ArraySteel for AloneCore {
-    fn is_present(&self) -> bool {
-        true
-    }
-
     fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
         if i == j { self.added_inductance_h } else { 0.0 }
     }
@@ -145,27 +145,11 @@ impl ArraySteel for AloneCore {
             TWO_OF_ONE_CORE
         })
     }
-
-    fn coupled(&self) -> Option<&CoupledArray> {
-        None
-    }
 }
 
 impl ArraySteel for CoupledArray {
-    fn is_present(&self) -> bool {
-        true
-    }
-
     fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
         self.added_inductance_h[(i, j)]
-    }
-
-    fn axial_source(&self, _: Winding, _: f64) -> Option<Box<dyn AxialSource>> {
-        None
-    }
-
-    fn direct(&self, _: &Winding) -> Option<(DirectField<'_>, &'static str)> {
-        None
     }
 
     fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
@@ -177,26 +161,14 @@ impl ArraySteel for CoupledArray {
         Some(TWO_OF_COUPLED_CORES)
     }
 
-    fn coupled(&self) -> Option<&CoupledArray> {
+    fn coupled(&self) -> Option<&Self> {
         Some(self)
     }
 }
 
 impl ArraySteel for IronArray {
-    fn is_present(&self) -> bool {
-        true
-    }
-
     fn added_inductance_h(&self, i: usize, j: usize) -> f64 {
         self.added_inductance_h[(i, j)]
-    }
-
-    fn axial_source(&self, _: Winding, _: f64) -> Option<Box<dyn AxialSource>> {
-        None
-    }
-
-    fn direct(&self, _: &Winding) -> Option<(DirectField<'_>, &'static str)> {
-        None
     }
 
     fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
@@ -207,10 +179,6 @@ impl ArraySteel for IronArray {
 
     fn method(&self) -> Option<&'static str> {
         Some(TWO_OF_IRON_SURFACES)
-    }
-
-    fn coupled(&self) -> Option<&CoupledArray> {
-        None
     }
 
     fn iron(&self) -> Option<&Self> {
