@@ -22,7 +22,7 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
         trajectory.source
     ));
     sheet.line(
-        "wanted",
+        "requested",
         &format!(
             "{} N/m times the height, {}, at most {} upward",
             number(summary.lambda_n_per_m),
