@@ -90,10 +90,10 @@ pub struct Decided {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NoLambda {
     /// All heights are zero.
-    #[error("no force is wanted at any point")]
+    #[error("no force is requested at any point")]
     NothingWanted,
     /// No force of the requested sign.
-    #[error("no force in the wanted direction is within reach at point {0}")]
+    #[error("no force in the requested direction is within reach at point {0}")]
     TooWeak(usize),
     /// The least force exceeds what is requested there at every lambda that another point allows.
     #[error(

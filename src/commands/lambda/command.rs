@@ -64,7 +64,7 @@ pub struct Lambda {
     requested: ForceFlags,
     #[command(flatten)]
     uncertain: UncertaintyFlags,
-    /// Draw error and currents over lambda, the errors over the surface and force against wanted
+    /// Draw error and currents over lambda, the errors over the surface and force against requested
     /// force (.svg, .png or .pdf); `-` for standard output
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,

@@ -36,7 +36,7 @@ impl Surface {
         };
         let error_n = object.curves.chosen.as_ref().map(|forces| {
             let pairs = forces.static_n.iter().zip(&forces.requested_n);
-            at_points(&mut pairs.map(|(given, wanted)| given - wanted))
+            at_points(&mut pairs.map(|(given, wanted)| given - requested))
         });
         Self {
             x_m: [grid.x_m.from_m, grid.x_m.to_m],
@@ -182,7 +182,7 @@ fn shares(surface: &Surface) -> Option<Table> {
     ]);
     Some(Table {
         caption: "Force error over the points, as numbers".to_owned(),
-        head: vec![("part of the points", false), ("given - wanted", true)],
+        head: vec![("part of the points", false), ("given - requested", true)],
         rows,
         prose: false,
     })
