@@ -55,7 +55,7 @@
 //! let middle = map.gz_t_per_m_per_a[3 * 27 + 13]; // coil 3 of [coil, z, y, x]
 //! assert!((middle - gradient[2][2]).abs() < 1e-8 * middle.abs());
 //!
-//! // 4. An object, and the points at which its force is wanted.
+//! // 4. An object, and the points at which its force is requested.
 //! let text = r#"
 //!     name = "dome"
 //!     primitive = "half-sphere"

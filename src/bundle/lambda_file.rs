@@ -241,7 +241,7 @@ pub struct FeedbackShell {
 /// `max(share lambda h, threshold)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TolerancePoint {
-    /// N/m; null where no force is wanted, where any is tolerated, or where none can be kept.
+    /// N/m; null where no force is requested, where any is tolerated, or where none can be kept.
     pub lambda_n_per_m: Option<f64>,
     /// The part of the requested force that is not felt: `jnd`.
     pub share: f64,

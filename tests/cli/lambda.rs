@@ -308,7 +308,7 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
     assert!(feedback["lambda_n_per_m"].as_f64().unwrap() > 0.0);
     let reason = feedback["shell"]["reason"].as_str().unwrap();
     assert!(
-        reason.contains("no force in the wanted direction"),
+        reason.contains("no force in the requested direction"),
         "{reason}"
     );
     let svg = String::from_utf8(place.read("none.svg")).unwrap();

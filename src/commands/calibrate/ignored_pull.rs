@@ -28,7 +28,7 @@ pub(crate) struct Measured {
     wanted_n: f64,
     /// Whether coupled cores were taken one by one, being many.
     one_by_one: bool,
-    /// Where its share of the requested force is largest; `None` where no force is wanted.
+    /// Where its share of the requested force is largest; `None` where no force is requested.
     weakest: Option<Share>,
 }
 

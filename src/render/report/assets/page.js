@@ -56,7 +56,7 @@ own("errors", (place) => {
   const [error, height] = [numbers(s.error), numbers(s.height)];
   const drawn = {
     x: around(s.x, s.columns), y: around(s.y, s.rows), nodesX: s.x, nodesY: s.y,
-    columns: s.columns, rows: s.rows, values: error, unit: "mN", name: "given - wanted", zero: true,
+    columns: s.columns, rows: s.rows, values: error, unit: "mN", name: "given - requested", zero: true,
     circles: data.coils, more: (v, k) => [`height: ${say(height[k])} mm`],
   };
   return heat(place, place, () => drawn);
