@@ -27,7 +27,7 @@ const TABLE_SHARE: f64 = 0.1;
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
 
-/// Whether [`left_out`] counts that cores magnetise each other.
+/// Whether `left_out` counts that cores magnetise each other.
 #[must_use]
 pub fn couples_left_out(scene: &Scene) -> bool {
     coupled(scene.design) && scene.coils.len() <= MOST_COUPLED

@@ -335,7 +335,7 @@ pub struct Resolution {
     pub order: usize,
     /// Panels about a whole turn.
     pub per_turn: usize,
-    /// Steps towards an edge, each [`GRADING`] times as long.
+    /// Steps towards an edge, each `GRADING` times as long.
     pub levels: i32,
     /// Length of a panel far from edges, at most, m.
     pub panel_m: f64,

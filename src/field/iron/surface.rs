@@ -203,7 +203,7 @@ impl Surface {
         sum
     }
 
-    /// Dipoles that stand for the layers `values` ([node][drive]) at places that are `distance_m(z)` or more from
+    /// Dipoles that stand for the layers `values` (`[node][drive]`) at places that are `distance_m(z)` or more from
     /// whatever lies at the height z: their places with unit normals, and their moments [dipole, drive].
     #[must_use]
     pub fn dipoles(

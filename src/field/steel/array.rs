@@ -10,7 +10,7 @@
 //! q_own being the driven coil's own core under its own winding, solved on the fine outline.
 //! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
 //! A few cores exchange potentials on their whole grids; many only what passes between them (see
-//! [`super::reduced_coupling`]).
+//! `reduced_coupling`).
 
 use serde::{Deserialize, Serialize};
 

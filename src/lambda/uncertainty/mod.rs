@@ -11,7 +11,7 @@
 //!
 //! with places `q` of a rule for the box of displacements, shares `m_k` of the moment, strength `s` and mean
 //! square `d^2` of a driver's error: a quadratic, whose minimum over the limits is exact
-//! ([`error_form`]). The rule is that of Hammer and Stroud (1958) of degree 5, 14 places within the box.
+//! (`error_form`). The rule is that of Hammer and Stroud (1958) of degree 5, 14 places within the box.
 //!
 //! The request is that of the measured place: a sensor that is off by a constant moves the object, which no
 //! finger feels as a wrong force. Static currents know no sensor; for them the same displacement is that of
