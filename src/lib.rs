@@ -137,6 +137,7 @@ pub use fluxform_base::choice;
 pub use fluxform_base::choices;
 pub use fluxform_base::digits;
 pub use fluxform_base::force_direction;
+pub use fluxform_base::heating;
 pub use fluxform_base::point_weights;
 pub use fluxform_base::progress;
 pub use fluxform_base::uncertainty;

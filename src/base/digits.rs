@@ -60,6 +60,18 @@ fn plain(value: f64, digits: i32) -> String {
     }
 }
 
+/// A time for people: seconds below two minutes, minutes below two hours, then hours.
+#[must_use]
+pub fn duration(time_s: f64) -> String {
+    let (value, unit) = match time_s {
+        short if short < 120.0 => (short, "s"),
+        medium if medium < 7200.0 => (medium / 60.0, "min"),
+        long => (long / 3600.0, "h"),
+    };
+    let decimals = usize::from(value < 10.0);
+    format!("{value:.decimals$} {unit}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,5 +112,11 @@ mod tests {
             );
             assert!(rounding <= 0.51 * off, "{printed} of {value} +- {error}");
         }
+    }
+
+    #[test]
+    fn times_have_the_unit_in_which_they_are_read() {
+        let shown = [3.21, 60.0, 558.0, 2611.6, 7300.0].map(duration);
+        assert_eq!(shown, ["3.2 s", "60 s", "9.3 min", "44 min", "2.0 h"]);
     }
 }

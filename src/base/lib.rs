@@ -7,6 +7,7 @@ pub mod choice;
 pub mod digits;
 pub mod force_constant;
 pub mod force_direction;
+pub mod heating;
 pub mod point_weights;
 pub mod progress;
 pub mod uncertainty;

@@ -14,6 +14,12 @@ pub const REFERENCE_TEMPERATURE_C: f64 = 20.0;
 /// Density of annealed copper at 20 C, kg/m^3 (IEC 60028).
 pub const COPPER_DENSITY_KG_PER_M3: f64 = 8890.0;
 
+/// Specific heat of copper at 20 C, J/(kg K) (handbooks: 383 to 387).
+pub const COPPER_HEAT_CAPACITY_J_PER_KG_K: f64 = 385.0;
+
+/// Specific heat of low-carbon steel, J/(kg K) (handbooks: 450 to 490).
+pub const STEEL_HEAT_CAPACITY_J_PER_KG_K: f64 = 460.0;
+
 /// Smallest force a finger feels, N (Burdea 1999).
 pub const DETECTION_THRESHOLD_N: f64 = 0.8e-3;
 

@@ -9,6 +9,7 @@ use super::artefact::Input;
 use super::headline::Headline;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
+use fluxform_base::heating::Heating;
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
@@ -100,6 +101,10 @@ pub struct LambdaFile {
     /// The felt error under the uncertainties given; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Study>,
+    /// How warm the coil of the largest current becomes while it flows; absent without a lambda and in
+    /// files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hottest_coil: Option<Heating>,
     /// What the result comes to; absent without a lambda and in files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub headline: Option<Headline>,

@@ -1,12 +1,14 @@
 //! Pieces of summaries that several commands print alike.
 
-use super::quantity::{count, error, length_error, mm, number, number_to, percent, share};
+use super::quantity::{count, error, length_error, mm, number, number_to, percent, share, si};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::headline::{BudgetPart, FeltForce, FeltPart, Headline};
 use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
+use crate::digits::duration;
+use crate::heating::Heating;
 use crate::lambda::GivenForce;
 use crate::lambda::uncertainty::{CurrentsError, Study};
 use crate::uncertainty::Cause;
@@ -103,6 +105,25 @@ pub fn heights(min_m: f64, max_m: f64) -> String {
     } else {
         format!("{} to {}", mm(min_m), mm(max_m))
     }
+}
+
+/// How warm a coil becomes while its current flows.
+pub fn heating(of: &Heating) -> String {
+    let celsius = |c: f64| format!("{} C", number_to(c, 3));
+    let melted = || "beyond any winding".to_owned();
+    let after = of.after_c.map_or_else(melted, celsius);
+    let steady = of.steady_c.map_or_else(melted, celsius);
+    let limit = of.winding_max_s.map_or_else(String::new, |time_s| {
+        let limit = celsius(of.winding_max_c);
+        format!("; {limit} after {}: no continuous mode", duration(time_s))
+    });
+    format!(
+        "{} W at {}: from {} to {after} after {}, {steady} in the long run{limit}",
+        number_to(of.power_w, 3),
+        si(of.current_a, "A"),
+        celsius(of.ambient_c),
+        duration(of.heating_s),
+    )
 }
 
 /// Each thing that was left out with its cost, one line each.

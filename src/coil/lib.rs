@@ -3,6 +3,7 @@
 pub mod array_search;
 pub mod circuit;
 pub mod drive;
+pub mod heat;
 pub mod inductance;
 pub mod limits;
 pub mod mutual;

@@ -6,6 +6,7 @@ use super::reader::{Located, Section};
 use super::search::{self, SearchSpace};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
+use fluxform_base::heating::Cooling;
 use fluxform_base::uncertainty::Uncertainty;
 
 /// A command's requirements on a design. Coils that it does not place may overlap, with a warning.
@@ -67,6 +68,8 @@ impl Need {
         match key.split('.').next() {
             Some("target") => self.target,
             Some("workspace") => self.workspace,
+            // It decides no force; results state it beside the temperatures.
+            Some("cooling") => false,
             _ => true,
         }
     }
@@ -85,6 +88,7 @@ pub(super) struct Draft {
     pub(super) magnet: MagnetDraft,
     pub(super) supply: SupplyDraft,
     pub(super) limits: Limits,
+    pub(super) cooling: Cooling,
     pub(super) uncertainty: Uncertainty,
     pub(super) target_height: Located<f64>,
     pub(super) workspace: WorkspaceDraft,
@@ -114,6 +118,7 @@ impl Draft {
             magnet: sections::magnet(root.section("magnet")),
             supply: sections::supply(root.section("supply")),
             limits: limits::read(root.section("limits")),
+            cooling: sections::cooling(root.section("cooling")),
             uncertainty: sections::uncertainty(root.section("uncertainty")),
             target_height: sections::target_height_mm(root.section("target")),
             workspace: sections::workspace(root.section("workspace")),

@@ -13,7 +13,7 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[plate]\n[[iron]]\n[array]\n[magnet]\n[supply]\n[limits]\n\
-                            [uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
+                            [cooling]\n[uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
                             [search.core]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
@@ -186,6 +186,19 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "limits.array_settling_max_ms",
         "five time constants of the slowest coil among its neighbours",
+    ),
+    (
+        "cooling.surface_w_per_m2_k",
+        "heat that leaves a coil's surface: still air and radiation",
+    ),
+    ("cooling.ambient_c", "temperature of the air"),
+    (
+        "cooling.winding_max_c",
+        "temperature that the wire's insulation stands for long",
+    ),
+    (
+        "cooling.heating_s",
+        "how long currents flow for which a temperature is stated",
     ),
     (
         "uncertainty.sensor_mm",

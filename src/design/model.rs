@@ -7,6 +7,7 @@ use super::search::SearchSpace;
 use std::path::{Path, PathBuf};
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
+use fluxform_base::heating::Cooling;
 use fluxform_base::uncertainty::Uncertainty;
 use fluxform_numerics::axis::Axis;
 
@@ -31,6 +32,8 @@ pub struct Design {
     pub magnet: Magnet,
     /// Current and voltage limits.
     pub supply: Supply,
+    /// How the coils lose heat.
+    pub cooling: Cooling,
     /// What is not exactly known of the display in use.
     pub uncertainty: Uncertainty,
     /// Limits that `evaluate` and `optimize` check.

@@ -89,6 +89,7 @@ impl Draft {
             magnet: magnet_m(&self.magnet),
             supply: supply_of(self.supply, coils),
             limits: self.limits,
+            cooling: self.cooling,
             uncertainty: self.uncertainty,
             target_height_m: m_from_mm(self.target_height.value),
             workspace: workspace_m(&self.workspace)?,

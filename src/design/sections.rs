@@ -12,6 +12,7 @@ use super::rule::{
     RELATIVE_PERMEABILITY_DEFAULT, Rule, WIRE_MM, slip,
 };
 use super::values::OneOrMany;
+use fluxform_base::heating::Cooling;
 use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 use fluxform_numerics::axis::Axis;
@@ -348,6 +349,31 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
     }
     s.finish();
     draft
+}
+
+/// Free convection and radiation of a dark surface some ten degrees above a room, about half each.
+const SURFACE_W_PER_M2_K: f64 = 12.0;
+/// Thermal class F of enamelled wire (IEC 60085).
+const WINDING_MAX_C: f64 = 155.0;
+
+/// `[cooling]`.
+pub fn cooling(mut s: Section<'_>) -> Cooling {
+    let warm = Rule::any("C").bound(Bound::AtLeast(ABSOLUTE_ZERO_C));
+    let surface = Rule::any("W/(m^2 K)").positive();
+    let cooling = Cooling {
+        surface_w_per_m2_k: s
+            .number_or("surface_w_per_m2_k", &surface, SURFACE_W_PER_M2_K)
+            .value,
+        ambient_c: s
+            .number_or("ambient_c", &warm, REFERENCE_TEMPERATURE_C)
+            .value,
+        winding_max_c: s.number_or("winding_max_c", &warm, WINDING_MAX_C).value,
+        heating_s: s
+            .number_or("heating_s", &Rule::any("s").positive(), 60.0)
+            .value,
+    };
+    s.finish();
+    cooling
 }
 
 /// `[uncertainty]`.

@@ -6,6 +6,7 @@ use crate::design::{Core, Steel as Described, source};
 use crate::field::steel::CoreShape;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::winding::Winding;
+use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// More permeable steel changes no field by more than its inverse.
 const MOST_PERMEABLE: f64 = 1e9;
@@ -40,6 +41,12 @@ pub enum Material {
 }
 
 impl SceneCore {
+    /// Mass, kg.
+    #[must_use]
+    pub fn mass_kg(&self) -> f64 {
+        self.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3
+    }
+
     /// Conductivity of a solid core whose slowest eddy currents die out as fast, S/m: those of a
     /// sheet of thickness d in mu sigma (d / pi)^2, those of a cylinder of radius a in mu sigma (a / x)^2,
     /// x the first zero of J_0.

@@ -28,6 +28,7 @@ use rayon::prelude::*;
 use crate::RunError;
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
+use crate::coil::heat::warm_coil;
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
 use crate::field::batch::Gradients;
 use crate::field::components::Components;
@@ -36,6 +37,7 @@ use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
+use crate::heating::Heating;
 use crate::lambda::uncertainty::Turned;
 use crate::map::tabulate::PlacedCoil;
 use crate::numerics::vec3::{cross, dot};
@@ -202,6 +204,15 @@ impl<'a> Scene<'a> {
     #[must_use]
     pub fn rated_current_a(&self) -> f64 {
         largest(&self.upper_a)
+    }
+
+    /// How warm a coil alone in still air becomes under a current that stays.
+    #[must_use]
+    pub fn heated(&self, current_a: f64) -> Heating {
+        let cooling = &self.design.cooling;
+        let core_kg = self.core.as_ref().map_or(0.0, SceneCore::mass_kg);
+        let wire_c = self.design.wire.temperature_c;
+        warm_coil(&self.winding, &self.circuit, wire_c, core_kg, cooling).heated(current_a, cooling)
     }
 
     /// How far below its centre the magnet extends, m; 0 for a dipole.

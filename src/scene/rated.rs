@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Scene;
+use super::core_material::SceneCore;
 use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck};
-use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// One coil alone at its rated current, SI.
 pub(crate) struct Rated {
@@ -83,10 +83,7 @@ impl Rated {
             ..scene.circuit
         };
         let power_w = circuit.power_w(current_a);
-        let steel_kg = scene
-            .core
-            .as_ref()
-            .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
+        let steel_kg = scene.core.as_ref().map_or(0.0, SceneCore::mass_kg);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
         let target = single.target(scene, current_a)?;
         let mut accuracy_missed = missed(&single.accuracy, single.tolerance);

@@ -18,7 +18,6 @@ use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::winding::KERNEL_ERROR;
 use crate::field::winding::{AxialField, Winding};
-use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// The steel of the coil.
 #[derive(Debug, Clone, Serialize)]
@@ -247,7 +246,7 @@ impl Single {
         let facts = CoreSummary {
             radius_m: shape.radius_m,
             length_m: shape.length_m(),
-            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            mass_kg: core.mass_kg(),
             relative_permeability: mu_r,
             material: MaterialKind::Linear,
             peak_field_t: inside.peak_t,
@@ -312,7 +311,7 @@ impl Single {
         let facts = CoreSummary {
             radius_m: shape.radius_m,
             length_m: shape.length_m(),
-            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            mass_kg: core.mass_kg(),
             relative_permeability: initial,
             material: MaterialKind::Curve,
             peak_field_t: state.inside.peak_b_t,

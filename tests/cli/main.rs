@@ -8,6 +8,7 @@ mod codes;
 mod error_target;
 mod files;
 mod first_contact;
+mod heat;
 mod help;
 mod interrupt;
 mod iron;

@@ -165,6 +165,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         rank: 3,
         points: points.len(),
         weights: fluxform_base::point_weights::Weights::Equal,
+        hottest_coil: None,
         headline: None,
         path: vec![PathStep {
             lambda_n_per_m: 4.9429,

@@ -42,6 +42,12 @@ pub fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> Stri
         &format!("chosen by {}", file.criterion.described(&percent(file.jnd))),
     );
     force_lines(&mut sheet, report);
+    let heat = of_shapes(report, |file| {
+        Some(describe::heating(file.hottest_coil.as_ref()?))
+    });
+    if !heat.is_empty() {
+        sheet.line("heat", &heat.join("\n"));
+    }
     sheet.line("accuracy", &accuracies(report));
     if let Some(steel) = working_points(report) {
         sheet.line("steel", &steel);
@@ -182,17 +188,25 @@ fn computed(headline: &Headline) -> String {
     )
 }
 
-/// The lines of every shape, each beginning with its name.
+/// The lines of every shape, each beginning with its name; one line where it is that of all.
 fn of_shapes(
     report: &CalibrateReport,
     text: impl Fn(&LambdaFile) -> Option<String>,
 ) -> Vec<String> {
     let files = report.bundles.iter().map(|bundle| &bundle.lambda.file);
-    let line = |file: &LambdaFile| {
-        let text = text(file)?.replace('\n', "\n  ");
-        Some(format!("{}: {text}", file.shape))
-    };
-    files.filter_map(line).collect()
+    let texts = files.filter_map(|file| Some((&file.shape, text(file)?)));
+    let texts: Vec<(&String, String)> = texts.collect();
+    match texts.first() {
+        Some((_, first))
+            if texts.len() == report.bundles.len()
+                && texts.iter().all(|(_, text)| text == first) =>
+        {
+            vec![first.clone()]
+        }
+        _ => (texts.into_iter())
+            .map(|(shape, text)| format!("{shape}: {}", text.replace('\n', "\n  ")))
+            .collect(),
+    }
 }
 
 /// What the bundles do without: a line for every thing, with its reason where that is the same of all

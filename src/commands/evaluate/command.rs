@@ -142,6 +142,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
             si(target.current_a, "A")
         ),
     );
+    sheet.line("heat", &describe::heating(&result.heat));
     if let Some(core) = &result.core {
         sheet.line("core", &steel_core(core, target));
     }

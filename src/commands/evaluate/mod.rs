@@ -13,6 +13,7 @@ use crate::coil::circuit::Circuit;
 use crate::coil::limits::LimitCheck;
 use crate::coil::transient::{LEFT, VoltageStep, core_energy_share};
 use crate::design::Design;
+use crate::heating::Heating;
 use crate::scene::Scene;
 use crate::scene::neighbours::{self, ArraySummary};
 use crate::scene::rated::{CoilSummary, Rated};
@@ -40,6 +41,8 @@ pub struct Evaluation {
     /// Current and force after a voltage step; absent for air coils.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transient: Option<Transient>,
+    /// How warm the coil becomes at the rated current.
+    pub heat: Heating,
     /// Limits by name.
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// The array; absent for a single coil.
@@ -122,6 +125,7 @@ pub fn evaluate(
         target: rated.target,
         core: rated.core,
         transient,
+        heat: scene.heated(scene.rated_current_a()),
         limits: rated.limits,
         array,
         accuracy: rated.accuracy,

@@ -9,6 +9,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{
     AtLambda, LambdaFile, PathStep, TolerancePoint, WorstPointAt, WorstPointFile, WorstPointStep,
 };
+use crate::heating::Heating;
 use crate::lambda::worst::{WorstPath, WorstSolution, felt};
 use crate::lambda::{Breakpoint, Event, GivenForce, OperatingPoint, Solution, Status};
 use crate::units::DETECTION_THRESHOLD_N;
@@ -65,6 +66,7 @@ impl PosedProblem<'_> {
             given_force: chosen.and_then(|point| self.given(point, solution)),
             sideways: None,
             uncertainty: None,
+            hottest_coil: chosen.map(|point| self.hottest(&point.currents_a)),
             headline: None,
             accuracy,
         };
@@ -81,6 +83,11 @@ impl PosedProblem<'_> {
             }
         }
         Ok(file)
+    }
+
+    fn hottest(&self, currents_a: &[f64]) -> Heating {
+        let largest_a = currents_a.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+        self.scene.heated(largest_a)
     }
 
     fn given(&self, point: &OperatingPoint, solution: &Solution) -> Option<GivenForce> {

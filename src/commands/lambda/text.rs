@@ -61,6 +61,12 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     if let Some(currents) = &file.currents_a {
         sheet.line("currents", &describe::currents(design, currents));
     }
+    if let Some(heat) = &file.hottest_coil {
+        sheet.line(
+            "heat",
+            &format!("of the hottest coil {}", describe::heating(heat)),
+        );
+    }
     if let Some(at) = &file.at {
         at_lines(&mut sheet, design, at);
     }

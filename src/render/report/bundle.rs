@@ -1,5 +1,6 @@
 //! The page of a calibrated object.
 
+use fluxform_base::digits::duration;
 use fluxform_bundle::artefact::Input;
 use fluxform_bundle::lambda_file::LambdaFile;
 use fluxform_bundle::manifest::LeftOut;
@@ -197,6 +198,23 @@ fn given(body: &mut Html, file: &LambdaFile) {
                 percent(sideways.feedback_share)
             ),
         );
+    }
+    if let Some(heat) = &file.hottest_coil {
+        let celsius = |c: f64| format!("{} C", figures(c, 3));
+        let steady = heat.steady_c.map_or_else(|| "no end".to_owned(), celsius);
+        let limit = heat.winding_max_s.map_or_else(String::new, |time_s| {
+            format!(
+                "; {} after {}",
+                celsius(heat.winding_max_c),
+                duration(time_s)
+            )
+        });
+        let note = format!(
+            "in the long run, {} W in still air of {}{limit}",
+            figures(heat.power_w, 3),
+            celsius(heat.ambient_c)
+        );
+        tile(body, "hottest coil", &steady, &note);
     }
 }
 
