@@ -1,9 +1,10 @@
 //! A design as a drawing of its array.
 
-use crate::design::iron::{Plate, PlateOutline};
+use crate::design::iron::{Iron, Plate, PlateOutline};
 use crate::design::{Coil, Design};
+use crate::field::iron::bodies::{self, Solid};
 use crate::plot::array::{ArrayPlot, Body, Part, Role};
-use crate::scene::iron::middle;
+use crate::scene::iron::{body, middle};
 
 /// The array of `design` with its coils, the magnet and the workspace; `None` without a coil.
 #[must_use]
@@ -26,6 +27,9 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
             .as_ref()
             .map(|plate| part(Role::Plate, plate_body(design, &coil, plate))),
     );
+    for iron in &design.iron {
+        parts.extend(iron_parts(iron, middle[1]));
+    }
     let (half, centre) = (0.5 * design.magnet.length_m, design.target_height_m);
     parts.push(part(
         Role::Magnet,
@@ -66,6 +70,85 @@ fn plate_body(design: &Design, coil: &Coil, plate: &Plate) -> Body {
     }
 }
 
+/// A body of steel cut at `section_y_m`, and its bore.
+fn iron_parts(iron: &Iron, section_y_m: f64) -> Vec<Part> {
+    let outlines = |solid: Solid, hollow: bool| {
+        let solid = bodies::Body {
+            solid,
+            ..body(iron)
+        };
+        let places: Vec<[f64; 3]> = solid.places_m().collect();
+        let ends = |axis: usize| {
+            let values = places.iter().map(|place| place[axis]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                [low.min(value), high.max(value)]
+            })
+        };
+        let level = iron.rotate_deg[..2].iter().all(|angle| *angle == 0.0);
+        // From above the bore of a body that lies is not seen.
+        let from_above = places.iter().filter(|_| level || !hollow);
+        Body::Outlines {
+            ends_m: [0, 1, 2].map(ends),
+            plan_m: convex_hull(from_above.map(|place| [place[0], place[1]]).collect()),
+            section_m: convex_hull(crossings(&places, section_y_m)),
+            hollow,
+        }
+    };
+    let whole = body(iron).solid;
+    let bore = match whole {
+        Solid::Tube([inner, _, length]) if inner > 0.0 => Some(Solid::Tube([0.0, inner, length])),
+        Solid::Tube(_) | Solid::Box(_) | Solid::Ball(_) => None,
+    };
+    let bore = bore.map(|bore| part(Role::Iron, outlines(bore, true)));
+    let whole = part(Role::Iron, outlines(whole, false));
+    std::iter::once(whole).chain(bore).collect()
+}
+
+/// Where the lines between neighbours on the faces' grids pass through the plane at `y_m`, by x and z.
+fn crossings(places: &[[f64; 3]], y_m: f64) -> Vec<[f64; 2]> {
+    let side = bodies::Body::STEPS + 1;
+    let mut out = Vec::new();
+    for face in places.chunks_exact(side * side) {
+        let across = (0..side * side)
+            .filter(|k| (k + 1) % side > 0)
+            .map(|k| [k, k + 1]);
+        let along = (0..side * (side - 1)).map(|k| [k, k + side]);
+        for [a, b] in across.chain(along).map(|pair| pair.map(|k| face[k])) {
+            let share = (y_m - a[1]) / (b[1] - a[1]);
+            if (0.0..=1.0).contains(&share) {
+                out.push([a[0] + share * (b[0] - a[0]), a[2] + share * (b[2] - a[2])]);
+            }
+        }
+    }
+    out
+}
+
+/// The corners of the smallest convex outline of points in a plane, anticlockwise (Andrew's chains).
+fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let turns_left = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
+    };
+    let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut corners: Vec<[f64; 2]> = Vec::new();
+        for point in points {
+            while let [.., a, b] = corners[..] {
+                if turns_left(a, b, point) {
+                    break;
+                }
+                corners.pop();
+            }
+            corners.push(point);
+        }
+        corners.pop();
+        corners
+    };
+    let mut corners = chain(&mut points.iter().copied());
+    corners.extend(chain(&mut points.iter().rev().copied()));
+    corners
+}
+
 fn part(role: Role, body: Body) -> Part {
     Part {
         role,
@@ -95,4 +178,73 @@ fn coil_parts(design: &Design, coil: &Coil, axis_m: [f64; 2], number: usize) -> 
     };
     let core = core.map(|body| part(Role::Core, body));
     std::iter::once(winding).chain(core).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Need;
+    use std::path::Path;
+
+    const TEXT: &str = "name = \"pair\"\n[coil]\ninner_diameter_mm = 14.0\nouter_diameter_mm = 22.0\n\
+                        length_mm = 30.0\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\n\
+                        pitch_mm = 33.0\n";
+
+    fn drawn(iron: &str) -> Vec<Part> {
+        let text = format!("{TEXT}[[iron]]\n{iron}");
+        let (design, _) = Design::from_toml(&text, Path::new("d.toml"), Need::EVALUATE).unwrap();
+        let plot = drawing(&design).unwrap();
+        plot.parts
+            .into_iter()
+            .filter(|part| part.role == Role::Iron)
+            .collect()
+    }
+
+    fn area(corners: &[[f64; 2]]) -> f64 {
+        let next = corners.iter().cycle().skip(1);
+        let pairs = corners.iter().zip(next);
+        pairs.map(|(a, b)| 0.5 * (a[0] * b[1] - a[1] * b[0])).sum()
+    }
+
+    /// Bodies of steel were in the field and not in the picture.
+    #[test]
+    fn bodies_of_steel_are_drawn_as_they_are_turned_and_cut() {
+        let parts = drawn(
+            "shape = \"box\"\nsize_mm = [8, 6, 4]\ncenter_mm = [1, 1, -50]\nrotate_deg = [0, 0, 30]\n",
+        );
+        let [
+            Part {
+                body: Body::Outlines {
+                    plan_m, section_m, ..
+                },
+                ..
+            },
+        ] = &parts[..]
+        else {
+            panic!("{parts:?}");
+        };
+        assert!((area(plan_m) - 48e-6).abs() < 1e-12);
+        let width = 6e-3 / (30_f64.to_radians().cos());
+        let height = section_m
+            .iter()
+            .fold(0.0_f64, |most, p| most.max((p[1] + 0.05).abs()));
+        assert!((height - 2e-3).abs() < 1e-12);
+        assert!(area(section_m) > 4e-3 * width, "{section_m:?}");
+        let ball = drawn("shape = \"ball\"\ndiameter_mm = 10\ncenter_mm = [0, 3, -50]\n");
+        let [
+            Part {
+                body: Body::Outlines { section_m, .. },
+                ..
+            },
+        ] = &ball[..]
+        else {
+            panic!("{ball:?}");
+        };
+        let disc = std::f64::consts::PI * 16e-6;
+        assert!(
+            (area(section_m) / disc - 1.0).abs() < 0.02,
+            "{}",
+            area(section_m) / disc
+        );
+    }
 }

@@ -272,7 +272,7 @@ pub(super) fn middle(axes: &[[f64; 2]]) -> [f64; 2] {
     })
 }
 
-fn body(iron: &Described) -> Body {
+pub(super) fn body(iron: &Described) -> Body {
     let [a, b, c] = iron.rotate_deg.map(|angle| angle.to_radians().sin_cos());
     let ((sa, ca), (sb, cb), (sc, cc)) = (a, b, c);
     Body {

@@ -97,9 +97,12 @@ impl Body {
         faces.into_iter().map(moved).collect()
     }
 
-    /// Places spread over its surface, m.
+    /// Steps along either side of a face in [`Body::places_m`].
+    pub const STEPS: usize = 16;
+
+    /// Places spread over its surface, m: of every face a grid, row by row.
     pub fn places_m(&self) -> impl Iterator<Item = Point> + use<> {
-        const STEPS: usize = 16;
+        const STEPS: usize = Body::STEPS;
         self.faces().into_iter().flat_map(|face| {
             (0..=STEPS * (STEPS + 2)).map(move |k| {
                 let (u, v) = (k / (STEPS + 1), k % (STEPS + 1));

@@ -1,6 +1,6 @@
 //! An array and what is around it, to scale: seen from above and cut along a row of coils.
 
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::drawing::Drawing;
 
@@ -27,6 +27,8 @@ pub enum Role {
     Winding,
     /// Steel below the coils.
     Plate,
+    /// Other steel.
+    Iron,
     /// Steel inside a winding.
     Core,
     /// The finger's magnet.
@@ -44,11 +46,12 @@ struct Look {
 
 impl Role {
     /// All of them, as they are drawn: later ones over earlier ones.
-    const ALL: [Self; 5] = [
-        Self::Workspace,
+    const ALL: [Self; 6] = [
+        Self::Iron,
         Self::Plate,
         Self::Winding,
         Self::Core,
+        Self::Workspace,
         Self::Magnet,
     ];
 
@@ -57,6 +60,7 @@ impl Role {
             Self::Workspace => ("workspace", "workspace", None, "#0072b2", true),
             Self::Winding => ("winding", "winding", Some("#e6a15c"), "#8a4b08", false),
             Self::Plate => ("steel plate", "plate", Some("#c3c9cf"), "#49525c", false),
+            Self::Iron => ("steel", "plate", Some("#c3c9cf"), "#49525c", false),
             Self::Core => ("steel core", "core", Some("#9aa3ad"), "#49525c", false),
             Self::Magnet => ("magnet", "magnet", Some("#d98cb3"), "#8f3f6b", false),
         };
@@ -71,7 +75,7 @@ impl Role {
 }
 
 /// A body, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// About an upright axis; without a bore where `inner_m` is 0.
     Tube {
@@ -86,6 +90,17 @@ pub enum Body {
     },
     /// A box: its ends along x, y and z.
     Block([[f64; 2]; 3]),
+    /// Anything convex, by what is seen of it.
+    Outlines {
+        /// Ends along x, y and z.
+        ends_m: [[f64; 2]; 3],
+        /// Corners from above.
+        plan_m: Vec<[f64; 2]>,
+        /// Corners of its section.
+        section_m: Vec<[f64; 2]>,
+        /// Whether it is a bore.
+        hollow: bool,
+    },
 }
 
 /// A body and what it is.
@@ -120,17 +135,19 @@ pub enum View {
 }
 
 /// A line or a closed outline of a view, px.
+#[derive(Clone)]
 enum Outline {
     Circle([f64; 2], f64),
     Rect([f64; 2], [f64; 2]),
+    Polygon(Vec<[f64; 2]>),
     Line([f64; 2], [f64; 2]),
 }
 
 /// Something drawn: as a role, or as ink.
 enum Mark {
     Body(Role, Outline),
-    /// The bore of a winding shows what is behind it.
-    Hole(Outline),
+    /// A bore shows what is behind it.
+    Hole(Role, Outline),
     Rule(Outline, bool),
     Text([f64; 2], String, Side),
 }
@@ -152,7 +169,7 @@ impl Body {
     /// Ends along x, y and z.
     fn ends_m(&self) -> [[f64; 2]; 3] {
         match *self {
-            Self::Block(ends) => ends,
+            Self::Block(ends) | Self::Outlines { ends_m: ends, .. } => ends,
             Self::Tube {
                 axis_m: [x, y],
                 outer_m: r,
@@ -169,6 +186,7 @@ impl Body {
                 let through = (low..=high).contains(&y_m);
                 through.then_some(x).into_iter().collect()
             }
+            Self::Outlines { .. } => Vec::new(),
             Self::Tube {
                 axis_m: [x, y],
                 inner_m,
@@ -232,7 +250,7 @@ impl ArrayPlot {
         for mark in &panel.marks {
             match mark {
                 Mark::Body(role, outline) => svg.push_str(&shape(outline, role.look().class)),
-                Mark::Hole(outline) => svg.push_str(&shape(outline, "bore")),
+                Mark::Hole(_, outline) => svg.push_str(&shape(outline, "bore")),
                 Mark::Rule(outline, strong) => {
                     svg.push_str(&shape(outline, if *strong { "zero" } else { "rule" }));
                 }
@@ -348,6 +366,27 @@ impl ArrayPlot {
         marks: &mut Vec<Mark>,
     ) {
         let [x, y, z] = part.body.ends_m();
+        if let Body::Outlines {
+            plan_m,
+            section_m,
+            hollow,
+            ..
+        } = &part.body
+        {
+            let corners = match view {
+                View::Plan => plan_m,
+                View::Section => section_m,
+            };
+            let corners: Vec<[f64; 2]> = corners.iter().map(|[x, y]| place(*x, *y)).collect();
+            if corners.len() > 2 {
+                let outline = Outline::Polygon(corners);
+                marks.push(match hollow {
+                    true => Mark::Hole(part.role, outline),
+                    false => Mark::Body(part.role, outline),
+                });
+            }
+            return;
+        }
         if view == View::Section {
             let cuts = part.body.cut(self.section_y_m);
             marks.extend(cuts.into_iter().map(|[from, to]| {
@@ -357,7 +396,9 @@ impl ArrayPlot {
         }
         let scale = self.scale();
         let outline = match part.body {
-            Body::Block(_) => Outline::Rect(place(x[0], y[1]), place(x[1], y[0])),
+            Body::Block(_) | Body::Outlines { .. } => {
+                Outline::Rect(place(x[0], y[1]), place(x[1], y[0]))
+            }
             Body::Tube {
                 axis_m: [x, y],
                 outer_m,
@@ -374,7 +415,8 @@ impl ArrayPlot {
         {
             let centre = place(x, y);
             if inner_m > 0.0 {
-                marks.push(Mark::Hole(Outline::Circle(centre, scale * inner_m)));
+                let bore = Outline::Circle(centre, scale * inner_m);
+                marks.push(Mark::Hole(part.role, bore));
             }
             let between = 0.5 * scale * (inner_m + outer_m);
             if let Some(label) = part
@@ -443,10 +485,20 @@ fn shape(outline: &Outline, class: &str) -> String {
             right - x,
             bottom - y
         ),
+        Outline::Polygon(corners) => format!("<path class=\"{class}\" d=\"{}\"/>", path(corners)),
         Outline::Line([x, y], [right, bottom]) => {
             format!("<path class=\"{class}\" d=\"M{x:.1} {y:.1}L{right:.1} {bottom:.1}\"/>")
         }
     }
+}
+
+/// A closed path.
+fn path(corners: &[[f64; 2]]) -> String {
+    let steps = corners.iter().enumerate().map(|(k, [x, y])| {
+        let letter = if k == 0 { 'M' } else { 'L' };
+        format!("{letter}{x:.1} {y:.1}")
+    });
+    steps.chain(std::iter::once("Z".to_owned())).collect()
 }
 
 fn text([x, y]: [f64; 2], content: &str, side: Side, bold: bool) -> Primitive {
@@ -483,7 +535,7 @@ fn add(scene: &mut Scene, mark: &Mark, offset: [f64; 2]) {
                 look.dashed,
             )
         }
-        Mark::Hole(outline) => (outline, "#ffffff", "#8a4b08", false),
+        Mark::Hole(role, outline) => (outline, "#ffffff", role.look().stroke, false),
         Mark::Rule(outline, strong) => (outline, "none", "#22272e", *strong),
     };
     let dash = dashed.then(|| "5 4".to_owned());
@@ -499,8 +551,19 @@ fn add(scene: &mut Scene, mark: &Mark, offset: [f64; 2]) {
             stroke_dasharray: dash.clone(),
         });
     };
-    match *outline {
+    match outline.clone() {
         Outline::Line(from, to) => line(from, to),
+        Outline::Polygon(corners) => {
+            let corners: Vec<[f64; 2]> = corners.into_iter().map(at).collect();
+            scene.add(Primitive::Path(Box::new(PathData {
+                d: path(&corners),
+                fill: Some(fill.into()),
+                stroke: stroke.into(),
+                stroke_width: 1.0,
+                opacity: None,
+                stroke_dasharray: None,
+            })));
+        }
         Outline::Rect([x, y], [right, bottom]) if dashed => {
             let corners = [[x, y], [right, y], [right, bottom], [x, bottom]];
             for (k, corner) in corners.iter().enumerate() {
@@ -567,7 +630,7 @@ mod tests {
 
     #[test]
     fn a_cut_beside_the_bore_goes_through_one_piece_of_the_winding() {
-        let body = array(0.007).parts[0].body;
+        let body = array(0.007).parts[0].body.clone();
         let through = body.cut(0.007);
         assert_eq!(through.len(), 2);
         assert!((through[0][0] - (0.013 - 0.019)).abs() < 1e-12);
