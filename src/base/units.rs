@@ -23,7 +23,13 @@ pub const STEEL_HEAT_CAPACITY_J_PER_KG_K: f64 = 460.0;
 /// Smallest force a finger feels, N (Burdea 1999).
 pub const DETECTION_THRESHOLD_N: f64 = 0.8e-3;
 
-/// Just-noticeable relative difference of finger force (Pang, Tan and Durlach 1991).
+/// Force below which differences are harder to notice, N, and by how much (introduction of Scientific
+/// Reports 2022, s41598-022-12010-0: 7 to 10 % above, 15 to 27 % below).
+pub const FAINT_FORCE_N: f64 = 0.5;
+/// See [`FAINT_FORCE_N`].
+pub const FAINT_FORCE_JND: [f64; 2] = [0.15, 0.27];
+
+/// Just-noticeable relative difference of finger force, of 2.5 to 10 N (Pang, Tan and Durlach 1991).
 pub const FORCE_JND: f64 = 0.07;
 
 /// Change of the remanence of sintered NdFeB with temperature, 1/K (0.11 to 0.12 % in makers' data sheets,

@@ -3,15 +3,16 @@
 use super::quantity::{count, error, length_error, mm, number, number_to, percent, share, si};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::headline::{BudgetPart, FeltForce, FeltPart, Headline};
-use crate::bundle::lambda_file::Sideways;
+use crate::bundle::lambda_file::{LambdaFile, Sideways};
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
 use crate::digits::duration;
 use crate::heating::Heating;
-use crate::lambda::GivenForce;
 use crate::lambda::uncertainty::{CurrentsError, Study};
+use crate::lambda::{Criterion, GivenForce};
 use crate::uncertainty::Cause;
+use crate::units::{FAINT_FORCE_JND, FAINT_FORCE_N, FORCE_JND};
 
 /// Coils beyond this many are summed up, not listed.
 const COILS_SHOWN: usize = 100;
@@ -124,6 +125,26 @@ pub fn heating(of: &Heating) -> String {
         celsius(of.ambient_c),
         duration(of.heating_s),
     )
+}
+
+/// The criterion, and where its just-noticeable difference is that of larger forces.
+pub fn chosen_by(file: &LambdaFile) -> String {
+    let by = file.criterion.described(&percent(file.jnd));
+    let [least, most] = FAINT_FORCE_JND;
+    // The requested force's root mean square.
+    let force_n =
+        (file.rms_error_n.zip(file.relative_rms_error)).map(|(error, share)| error / share);
+    let faint = force_n.is_some_and(|force_n| force_n < FAINT_FORCE_N);
+    let own = (file.jnd - FORCE_JND).abs() < 1e-12;
+    match file.criterion {
+        Criterion::Jnd if faint && own => format!(
+            "{by}, measured at 2.5 to 10 N; below {} N {} to {} are found",
+            number(FAINT_FORCE_N),
+            number(least * 100.0),
+            percent(most)
+        ),
+        Criterion::Jnd | Criterion::Linear | Criterion::Saturation | Criterion::Maxmin => by,
+    }
 }
 
 /// Each thing that was left out with its cost, one line each.

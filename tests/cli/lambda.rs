@@ -417,3 +417,18 @@ fn a_sum_that_binds_has_a_saturation_that_verifies() {
     );
     place.run(&["verify", folder]).ends(0);
 }
+
+/// The just-noticeable difference of forces of newtons was silently taken for tens of millinewtons.
+#[test]
+fn the_range_of_the_just_noticeable_difference_is_said() {
+    let place = Place::new();
+    let said = "measured at 2.5 to 10 N; below 0.5 N 15 to 27 %";
+    let text = |more: &[&str]| {
+        let args = [&["lambda", AIR, WEDGE], more].concat();
+        place.run(&args).ends(0).out
+    };
+    assert!(text(&[]).contains(said));
+    for other in [&["--jnd", "0.2"][..], &["--criterion", "linear"]] {
+        assert!(!text(other).contains("measured at"), "{other:?}");
+    }
+}

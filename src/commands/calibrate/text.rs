@@ -39,7 +39,7 @@ pub fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> Stri
     let file = &first.lambda.file;
     sheet.line(
         "lambda",
-        &format!("chosen by {}", file.criterion.described(&percent(file.jnd))),
+        &format!("chosen by {}", describe::chosen_by(file)),
     );
     force_lines(&mut sheet, report);
     let heat = of_shapes(report, |file| {

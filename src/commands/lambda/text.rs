@@ -35,7 +35,7 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     });
     let constants: Vec<String> = constants.collect();
     sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
-    sheet.line("chosen by", &file.criterion.described(&percent(file.jnd)));
+    sheet.line("chosen by", &describe::chosen_by(file));
     operating_point(&mut sheet, points, file);
     if let Some(worst) = &file.worst_point {
         sheet.line("worst point", &worst_point(worst));
