@@ -50,7 +50,7 @@ pub mod obj;
 pub mod off;
 pub mod placement;
 pub mod ply;
-mod point_areas;
+pub mod point_areas;
 pub mod point_flags;
 pub mod points;
 pub mod primitive;

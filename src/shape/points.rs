@@ -11,7 +11,7 @@ use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
 use crate::mesh::MeshFacts;
-use crate::point_areas::areas_m2;
+use crate::point_areas::{FineCells, areas_m2};
 use crate::point_flags::Marks;
 use crate::scattered::Probe;
 use crate::surface::Surface;
@@ -47,6 +47,8 @@ pub struct ConstraintPoints {
     pub marks: Vec<Marks>,
     /// Plan area that each point stands for, m^2; empty where points are not marked.
     pub area_m2: Vec<f64>,
+    /// Cells that the points describe badly, sampled finely; none where points are not marked.
+    pub fine: FineCells,
     /// Grid points without surface, skipped.
     pub outside: usize,
     /// Of the grid points without surface those that lie inside the silhouette, skipped or filled.
@@ -264,7 +266,7 @@ pub fn discretize_surface(
     if settings.marks {
         let probe = Probe::new(&surface, &points.grid);
         mark(&mut points, &probe, &found, progress)?;
-        points.area_m2 = point_areas_m2(&points, &probe, progress)?;
+        (points.area_m2, points.fine) = point_areas_m2(&points, &probe, progress)?;
     }
     let hidden = settings.marks.then(|| Hidden::of(&surface)).flatten();
     if let Some(share) = hidden
@@ -357,19 +359,24 @@ fn mark(
     Ok(())
 }
 
-/// The plan area of each point, m^2.
+/// The plan area of each point, m^2, and the cells that the points describe badly, whose point areas are
+/// those of the points too.
 fn point_areas_m2(
     points: &ConstraintPoints,
     probe: &Probe<'_>,
     progress: &dyn Progress,
-) -> Result<Vec<f64>, ShapeError> {
-    let mut present = vec![false; points.grid.len()];
-    for &place in &points.grid_index {
-        present[place] = true;
+) -> Result<(Vec<f64>, FineCells), ShapeError> {
+    let mut heights_m = vec![None; points.grid.len()];
+    for (&place, &height_m) in points.grid_index.iter().zip(&points.height_m) {
+        heights_m[place] = Some(height_m);
     }
-    let covered = |p: [f64; 2]| probe.at(p).is_some();
-    let all = areas_m2(&points.grid, &present, &covered, progress)?;
-    Ok(points.grid_index.iter().map(|&place| all[place]).collect())
+    let height_at = |p: [f64; 2]| Some(probe.at(p)?.0.height_m.max(0.0));
+    let (all, mut fine) = areas_m2(&points.grid, &heights_m, &height_at, progress)?;
+    let of_points = |all: &[f64]| points.grid_index.iter().map(|&place| all[place]).collect();
+    if !fine.smooth.is_empty() {
+        fine.point_area_m2 = of_points(&fine.point_area_m2);
+    }
+    Ok((of_points(&all), fine))
 }
 
 /// The requested axis; its nodes ascend.
@@ -447,6 +454,7 @@ fn collect(
         grid_index: Vec::with_capacity(found),
         marks: vec![Marks::PLAIN; found],
         area_m2: Vec::new(),
+        fine: FineCells::default(),
         outside: samples.len() - found,
         holes: 0,
     };

@@ -2,6 +2,7 @@
 
 mod cored;
 mod inputs;
+mod limit;
 mod near;
 mod sideways;
 

@@ -7,7 +7,6 @@ mod criteria;
 mod edges;
 mod exhaustive;
 mod feedback;
-mod limit;
 mod mirror;
 mod oracle;
 mod power;

@@ -5,11 +5,13 @@ use super::ladder::Ladders;
 use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
-use crate::lambda::{self, ForceProblem, Solution};
+use crate::commands::lambda::ForcesAt;
+use crate::lambda::{self, ForceProblem, Solution, Wiring};
 use crate::map::FieldMap;
 use crate::numerics::axis::Axis;
 use crate::progress::Silent;
 use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
 use crate::scene::felt_force::by_map;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
@@ -124,10 +126,17 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
             shape.document.name
         ))
     })?;
+    let problem = all.problem(scene, &resistance_ohm);
     let own_error = points.error_against_limit(
-        &all.problem(scene, &resistance_ohm),
         lambda_n_per_m,
-        settings,
+        (&problem, &problem),
+        (&Wiring::default(), settings),
+        ForcesAt {
+            scene,
+            solved: &solved,
+            field: ShapeField::default(),
+            progress: &bench.within(),
+        },
     )?;
     let position_m = places(shape, ladders, bench)?;
     let places = Places {

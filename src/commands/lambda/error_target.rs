@@ -3,7 +3,7 @@
 pub use crate::scene::tolerances::ErrorTarget;
 
 use super::LambdaReport;
-use super::points::WantedPoints;
+use super::points::{ForcesAt, WantedPoints};
 use super::{LambdaOptions, map_error};
 use crate::RunError;
 use crate::bundle::headline::{RequestedError, RunAtError};
@@ -145,8 +145,15 @@ impl Trial<'_> {
             return Ok(None);
         };
         // Too few points to say.
+        let with = (&options.wiring, &options.settings);
+        let at = ForcesAt {
+            scene,
+            solved: self.solved,
+            field: self.field,
+            progress,
+        };
         let of_points = points
-            .error_against_limit(&problem, lambda, &options.settings)?
+            .error_against_limit(lambda, (&problem, &unwired), with, at)?
             .unwrap_or(1.0);
         let between = match self.for_runtime {
             true => map_error::between_points(&report).0,

@@ -25,7 +25,7 @@ use self::error_target::{ChosenGrid, ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 use self::placement::Placed;
-pub(crate) use self::points::WantedPoints;
+pub(crate) use self::points::{ForcesAt, WantedPoints};
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
 use super::discretize::{self, PointsReport};
@@ -198,7 +198,8 @@ pub fn run(
     let coarser = coarser.as_ref().map(WantedPoints::of_scattered);
     // The steel is solved once, for the lowest of all places.
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
-    let lowest = of_all.into_iter().flatten().map(WantedPoints::lowest_m);
+    let lowest = of_all.into_iter().flatten();
+    let lowest = lowest.map(|points| points.lowest_place_m(&scene.design.workspace));
     let lowest_m = lowest.fold(f64::INFINITY, f64::min);
     let lowest_m = options
         .feedback
@@ -454,7 +455,7 @@ impl PosedProblem<'_> {
         }
         file.accuracy.extend(self.points.stages());
         let effects = [
-            ("lambda_of_points", self.effect_of_number(&file)?),
+            ("lambda_of_points", self.effect_of_number(&file, progress)?),
             ("lambda_of_heights", self.effect_of_heights(progress)?),
         ];
         for (name, moved) in effects {

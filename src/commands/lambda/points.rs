@@ -2,14 +2,22 @@
 
 use std::collections::BTreeMap;
 
+use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
 use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::scattered::ScatteredReport;
+use crate::design::Workspace;
 use crate::force_direction::RequestedForce;
-use crate::lambda::limit::{self, limit_error};
-use crate::lambda::{ForceProblem, ProblemError, Settings};
+use crate::lambda::limit::{self, FineSamples, limit_error};
+use crate::lambda::{ForceProblem, Settings, Wiring};
 use crate::point_weights::Weights;
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
+use crate::scene::passive;
+use crate::scene::steel::Solved;
+use crate::shape::point_areas::FineCells;
 
 /// Places, what is requested there, and what is known of their error.
 #[derive(Debug, Clone)]
@@ -36,6 +44,8 @@ pub(crate) struct WantedPoints {
     pub(crate) accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Where the points lie in their grid, if they are those of one.
     pub(super) grid: Option<GridPlaces>,
+    /// Samples of the cells that the points describe badly, if there are any.
+    fine: Option<FineCells>,
     /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
 }
@@ -51,6 +61,15 @@ pub(super) struct GridPlaces {
     pub(super) plan_m: [[f64; 2]; 2],
     /// row * columns + column of each point.
     pub(super) index: Vec<usize>,
+}
+
+/// What forces at further places are computed with.
+#[derive(Clone, Copy)]
+pub(crate) struct ForcesAt<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) solved: &'a Solved,
+    pub(crate) field: ShapeField<'a>,
+    pub(crate) progress: &'a dyn Progress,
 }
 
 impl WantedPoints {
@@ -75,6 +94,7 @@ impl WantedPoints {
                 plan_m: points.grid.plan(),
                 index: points.grid_index.clone(),
             }),
+            fine: Some(points.fine.clone()).filter(|fine| !fine.smooth.is_empty()),
             warnings: summary.warnings.clone(),
         }
     }
@@ -95,6 +115,7 @@ impl WantedPoints {
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
             grid: None,
+            fine: None,
             warnings: summary.warnings.clone(),
         }
     }
@@ -117,26 +138,80 @@ impl WantedPoints {
     }
 
     /// How far the constant of these points is from the limit of ever more of them, relative; `None`
-    /// for graded points, whose patches are compared with wider ones instead, and for too few.
+    /// for graded points, whose patches are compared with wider ones instead, and for too few. `unwired`
+    /// is `problem` before `wiring`.
     ///
     /// # Errors
-    /// A malformed problem.
+    /// A malformed problem; forces that cannot be computed; interruption.
     pub(crate) fn error_against_limit(
         &self,
-        problem: &ForceProblem,
         lambda_n_per_m: f64,
-        settings: &Settings,
-    ) -> Result<Option<f64>, ProblemError> {
+        (problem, unwired): (&ForceProblem, &ForceProblem),
+        (wiring, settings): (&Wiring, &Settings),
+        at: ForcesAt,
+    ) -> Result<Option<f64>, RunError> {
         if self.areas.len() != problem.points() || self.graded {
             return Ok(None);
         }
+        let cells = self.fine.as_ref();
         let grid = self.grid.as_ref().map(|grid| limit::GridPlaces {
             columns: grid.columns,
             rows: grid.rows,
             index: &grid.index,
+            smooth: cells.map_or(&[], |fine| &fine.smooth),
         });
-        let found = limit_error(problem, lambda_n_per_m, &self.areas, grid, settings)?;
-        Ok(found.map(|found| found.estimate))
+        let places_m = cells.map_or_else(Vec::new, |fine| {
+            self.sample_places_m(fine, &at.scene.design.workspace)
+        });
+        let forces_n_per_a =
+            (at.field).forces_n_per_a("cells", at.scene, at.solved, &places_m, at.progress)?;
+        let pull = match unwired.offset_n {
+            Some(_) if cells.is_some() => passive::pull(at.scene, &places_m, false)?,
+            _ => None,
+        };
+        let offset_n = pull.map(|pull| pull.forces_z_n(&places_m));
+        let samples = cells.map(|fine| ForceProblem {
+            forces_n_per_a: &forces_n_per_a,
+            height_m: &fine.height_m,
+            offset_n: offset_n.as_deref(),
+            weights: None,
+            ..*unwired
+        });
+        let rewired = samples.as_ref().map(|samples| wiring.apply(samples));
+        let wired = samples
+            .as_ref()
+            .zip(rewired.as_ref())
+            .map(|(plain, re)| re.problem(plain));
+        let fine = cells.zip(wired.as_ref()).map(|(cells, wired)| FineSamples {
+            forces_n_per_a: wired.forces_n_per_a,
+            height_m: wired.height_m,
+            offset_n: wired.offset_n,
+            areas: &cells.area_m2,
+            coarse_areas: &cells.coarse_area_m2,
+            point_areas: &cells.point_area_m2,
+        });
+        Ok(limit_error(
+            problem,
+            lambda_n_per_m,
+            &self.areas,
+            grid,
+            fine,
+            settings,
+        )?)
+    }
+
+    /// Where the magnet is at samples: no lower than the workspace, or the lowest point below it.
+    fn sample_places_m(&self, fine: &FineCells, workspace: &Workspace) -> Vec<[f64; 3]> {
+        let floor_m = workspace.z_m.from.min(self.lowest_m());
+        let heights_m: Vec<f64> = fine.height_m.iter().map(|h| h.max(floor_m)).collect();
+        positions_m(&fine.x_m, &fine.y_m, &heights_m)
+    }
+
+    /// The lowest place, of points and samples, that forces are computed at, m.
+    pub(super) fn lowest_place_m(&self, workspace: &Workspace) -> f64 {
+        let cells = self.fine.iter();
+        let samples = cells.flat_map(|fine| self.sample_places_m(fine, workspace));
+        samples.map(|[_, _, z]| z).fold(self.lowest_m(), f64::min)
     }
 
     /// The error of the heights at the points themselves, m: tessellation and rounding.

@@ -7,6 +7,7 @@
 //! errors of single points need not agree.
 
 use super::PosedProblem;
+use super::points::ForcesAt;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::lambda_file::LambdaFile;
@@ -25,22 +26,30 @@ impl PosedProblem<'_> {
     /// points, whose patches are compared with wider ones instead, and for too few points.
     ///
     /// # Errors
-    /// A problem that cannot be solved.
+    /// A problem that cannot be solved; interruption.
     pub(super) fn effect_of_number(
         &self,
         file: &LambdaFile,
+        progress: &dyn Progress,
     ) -> Result<Option<StageAccuracy>, RunError> {
         let Some(lambda) = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) else {
             return Ok(None);
         };
-        let settings = &self.options.settings;
-        let found = (self.points).error_against_limit(&self.problem, lambda, settings)?;
+        let with = (&self.options.wiring, &self.options.settings);
+        let problems = (&self.problem, &self.unwired);
+        let at = ForcesAt {
+            scene: self.scene,
+            solved: self.solved,
+            field: self.field,
+            progress,
+        };
+        let found = (self.points).error_against_limit(lambda, problems, with, at)?;
         Ok(found.map(|estimate| StageAccuracy {
             estimate,
             relative_to: "lambda".to_owned(),
             method: format!(
                 "an estimate against the limit of ever more points: what every second point in four \
-                 ways changes{}",
+                 ways and finer samples of broken cells change{}",
                 if self.problem.weights.is_some() {
                     ""
                 } else {

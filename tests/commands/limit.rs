@@ -5,9 +5,13 @@
 
 use std::f64::consts::TAU;
 
-use fluxform_lambda::limit::{GridPlaces, limit_error};
-use fluxform_lambda::{Criterion, ForceProblem, Settings, solve};
-use fluxform_numerics::random::Random;
+use fluxform::lambda::limit::{FineSamples, GridPlaces, limit_error};
+use fluxform::lambda::{Criterion, ForceProblem, Settings, solve};
+use fluxform::numerics::axis::Axis;
+use fluxform::numerics::random::Random;
+use fluxform::progress::Silent;
+use fluxform::shape::height::Grid;
+use fluxform::shape::point_areas::{FineCells, areas_m2};
 
 /// Finer along each axis for the limit.
 const FINER: usize = 8;
@@ -21,6 +25,10 @@ enum Kind {
     Smooth,
     Kinked,
     Jumping,
+    /// It ends at a line.
+    Cut,
+    /// A cap on nothing, steep at its rim.
+    Cap,
 }
 
 /// A random object over a square plan.
@@ -53,17 +61,25 @@ impl Object {
         }
     }
 
-    fn height_m(&self, [x, y]: [f64; 2]) -> f64 {
+    fn height_m(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let wave = (self.wave[0] * x + self.wave[2]).sin() * (self.wave[1] * y).cos();
         let smooth = self.level_m + self.slope[0] * x + self.slope[1] * y + self.wave_m * wave;
         let beyond = self.line[0] * x + self.line[1] * y - self.line[2];
-        smooth
-            + match self.kind {
-                Kind::Smooth => 0.0,
-                Kind::Kinked => 2.0 * self.step * beyond.max(0.0),
-                Kind::Jumping if beyond > 0.0 => self.step * 0.04,
-                Kind::Jumping => 0.0,
+        let more = match self.kind {
+            Kind::Smooth => 0.0,
+            Kind::Kinked => 2.0 * self.step * beyond.max(0.0),
+            Kind::Jumping if beyond > 0.0 => self.step * 0.04,
+            Kind::Jumping => 0.0,
+            Kind::Cut if beyond > 0.0 => return None,
+            Kind::Cut => 0.0,
+            Kind::Cap => {
+                let radius_m = 0.03 + 0.05 * self.step;
+                let [x, y] = [x - 0.2 * self.line[2], y + 0.2 * self.line[2]];
+                let left = radius_m * radius_m - x * x - y * y;
+                return (left >= 0.0).then(|| 0.6 * self.level_m + left.sqrt());
             }
+        };
+        Some(smooth + more)
     }
 }
 
@@ -101,30 +117,76 @@ struct Sampled {
     areas: Vec<f64>,
     index: Vec<usize>,
     samples: usize,
+    fine: FineCells,
+    fine_forces: Vec<f64>,
 }
 
 fn sampled(object: &Object, array: &Array, samples: usize) -> Sampled {
-    let node = |k: usize| HALF_M * (2.0 * k as f64 / (samples - 1) as f64 - 1.0);
-    let part = |k: usize| if k == 0 || k + 1 == samples { 0.5 } else { 1.0 };
-    let mut all = Sampled {
-        forces: Vec::new(),
-        heights: Vec::new(),
-        areas: Vec::new(),
-        index: (0..samples * samples).collect(),
+    let axis = Axis {
+        from: -HALF_M,
+        to: HALF_M,
         samples,
     };
-    for k in 0..samples * samples {
-        let at = [node(k % samples), node(k / samples)];
-        let height_m = object.height_m(at);
-        all.heights.push(height_m);
-        all.areas.push(part(k % samples) * part(k / samples));
-        let forces = (0..array.axes_m.len()).map(|coil| array.force(coil, at, height_m));
-        all.forces.extend(forces);
+    let grid = Grid {
+        x_m: axis,
+        y_m: axis,
+    };
+    let place = |k: usize| [axis.node(k % samples), axis.node(k / samples)];
+    let heights: Vec<Option<f64>> = (0..samples * samples)
+        .map(|k| object.height_m(place(k)))
+        .collect();
+    let (areas, mut fine) = areas_m2(&grid, &heights, &|p| object.height_m(p), &Silent).unwrap();
+    let index: Vec<usize> = (0..heights.len())
+        .filter(|&k| heights[k].is_some())
+        .collect();
+    let of_points = |all: &[f64]| index.iter().map(|&k| all[k]).collect::<Vec<_>>();
+    if !fine.smooth.is_empty() {
+        fine.point_area_m2 = of_points(&fine.point_area_m2);
     }
-    all
+    let forces_at = |at: [f64; 2], height_m: f64| {
+        (0..array.axes_m.len()).map(move |coil| array.force(coil, at, height_m))
+    };
+    let points = index.iter().map(|&k| (place(k), heights[k].unwrap()));
+    let plan = fine.x_m.iter().zip(&fine.y_m).zip(&fine.height_m);
+    Sampled {
+        forces: points
+            .clone()
+            .flat_map(|(at, height)| forces_at(at, height))
+            .collect(),
+        heights: points.map(|(_, height)| height).collect(),
+        areas: of_points(&areas),
+        samples,
+        fine_forces: plan
+            .flat_map(|((x, y), h)| forces_at([*x, *y], *h))
+            .collect(),
+        fine,
+        index,
+    }
 }
 
 impl Sampled {
+    /// The samples of broken cells in the place of their corners: the nearest to the limit.
+    fn with_samples(mut self) -> Self {
+        if self.fine.smooth.is_empty() {
+            return self;
+        }
+        let coils = self.forces.len() / self.heights.len();
+        let of_points = self.fine.point_area_m2.iter().enumerate();
+        let rows: Vec<usize> = of_points
+            .filter(|(_, area)| **area > 0.0)
+            .map(|(row, _)| row)
+            .collect();
+        let forces = rows
+            .iter()
+            .flat_map(|row| &self.forces[row * coils..(row + 1) * coils]);
+        self.forces = forces.chain(&self.fine_forces).copied().collect();
+        let heights = rows.iter().map(|&row| &self.heights[row]);
+        self.heights = heights.chain(&self.fine.height_m).copied().collect();
+        let areas = rows.iter().map(|&row| &self.fine.point_area_m2[row]);
+        self.areas = areas.chain(&self.fine.area_m2).copied().collect();
+        self
+    }
+
     fn problem<'a>(&'a self, limits: &'a Limits, by_area: bool) -> ForceProblem<'a> {
         ForceProblem {
             forces_n_per_a: &self.forces,
@@ -174,35 +236,61 @@ fn claimed_and_true(kind: Kind, by_area: bool, n: &mut Random) -> [f64; 2] {
         columns: points.samples,
         rows: points.samples,
         index: &points.index,
+        smooth: &points.fine.smooth,
     };
-    let stated = limit_error(&problem, lambda, &points.areas, Some(places), &settings);
+    let fine = (!points.fine.smooth.is_empty()).then_some(FineSamples {
+        forces_n_per_a: &points.fine_forces,
+        height_m: &points.fine.height_m,
+        offset_n: None,
+        areas: &points.fine.area_m2,
+        coarse_areas: &points.fine.coarse_area_m2,
+        point_areas: &points.fine.point_area_m2,
+    });
+    let places = Some(places);
+    let stated = limit_error(&problem, lambda, &points.areas, places, fine, &settings);
     let stated = stated.unwrap().expect("an estimate");
     let fine = sampled(&object, &array, FINER * (samples - 1) + 1);
-    let limit = chosen(&fine.problem(&limits, true), &settings);
-    [stated.estimate, (lambda / limit - 1.0).abs()]
+    let limit = chosen(&fine.with_samples().problem(&limits, true), &settings);
+    [stated, (lambda / limit - 1.0).abs()]
 }
 
 /// Claims of the points' effect were once 60 times too wide where heights are steep, and nothing at
 /// all where the surface is plane.
 #[test]
 fn the_limit_of_ever_more_points_lies_within_the_stated_error() {
-    let mut n = Random::new(20_261_122);
-    let mut ratios = Vec::new();
-    for kind in [Kind::Smooth, Kind::Kinked, Kind::Jumping] {
+    let (seed, objects) = match std::env::var("FLUXFORM_OBJECTS") {
+        Ok(count) => (7, count.parse().unwrap()),
+        Err(_) => (20_261_122, OBJECTS),
+    };
+    let mut n = Random::new(seed);
+    let mut missed = 0;
+    for kind in [
+        Kind::Smooth,
+        Kind::Kinked,
+        Kind::Jumping,
+        Kind::Cut,
+        Kind::Cap,
+    ] {
         for by_area in [true, false] {
-            for object in 0..OBJECTS {
+            let mut ratios = Vec::new();
+            for object in 0..objects {
                 let [claimed, off] = claimed_and_true(kind, by_area, &mut n);
-                assert!(
-                    claimed >= off,
-                    "{kind:?} {object}, by area {by_area}: {claimed:e} of {off:e}"
-                );
+                if claimed < off {
+                    println!("{kind:?} {object}, by area {by_area}: {claimed:e} of {off:e}");
+                    missed += 1;
+                }
                 ratios.push(claimed / off);
             }
+            ratios.sort_by(f64::total_cmp);
+            let median = ratios[ratios.len() / 2];
+            println!(
+                "{kind:?}, by area {by_area}: least {:.2}, median {median:.2}",
+                ratios[0]
+            );
+            assert!(median <= 10.0, "{kind:?}, by area {by_area}: {median}");
         }
     }
-    ratios.sort_by(f64::total_cmp);
-    let median = ratios[ratios.len() / 2];
-    assert!(median <= 10.0, "{median}");
+    assert_eq!(missed, 0);
 }
 
 /// The seed's kind of wedge: with equal weights lambda converges with the first power of the
