@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Opened;
+use super::felt::FeltSummary;
 use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
@@ -90,6 +91,9 @@ pub struct ForceSummary {
     /// All three components with feedback; absent where the upward one alone is requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vector: Option<VectorErrors>,
+    /// Under the uncertainties that the bundle was made with; absent where currents are not chosen for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub felt: Option<FeltSummary>,
 }
 
 /// Differences from the requested force vector, over the positions inside the map.
@@ -285,7 +289,11 @@ impl ReplaySummary {
             inputs: std::iter::once(opened.input.clone())
                 .chain(source.input)
                 .collect(),
-            made_with: made_with(source.synthesis.as_ref(), dynamics.is_some()),
+            made_with: made_with(
+                source.synthesis.as_ref(),
+                dynamics.is_some(),
+                opened.renderer.setting().is_some(),
+            ),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectorySummary {
                 source: source.source,
@@ -303,6 +311,7 @@ impl ReplaySummary {
                 fixed: errors(rows, |row| rows.static_error_n(row)),
                 vector: (bundle.manifest.force.as_ref())
                     .and_then(|force| vector_errors(rows, force.direction)),
+                felt: None,
             },
             currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
@@ -318,7 +327,13 @@ impl ReplaySummary {
             },
             saturated_time_fraction: times.part(rows, Answer::Saturated),
             outside_time_fraction: times.part(rows, Answer::Outside),
-            accuracy: bounds.stages(bundle, dynamics.is_some()),
+            accuracy: {
+                let mut stages = bounds.stages(bundle, dynamics.is_some());
+                // Currents chosen for uncertainties are not those of eq. 8, whose conditions are looked at there.
+                stages
+                    .retain(|name, _| *name != "allocation" || opened.renderer.setting().is_none());
+                stages
+            },
             dynamics,
             warnings,
             files: Vec::new(),
