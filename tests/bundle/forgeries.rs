@@ -29,22 +29,22 @@ const SHAPE: &str = "name = \"slope\"\nprimitive = \"wedge\"\nlow_mm = 31\nhigh_
                      x_mm = [-37, 37, 5]\ny_mm = [-23, 23, 4]\n";
 
 /// A real bundle of a small design, its inputs beside it.
-fn calibrated(folder: &Path, page: bool) -> PathBuf {
+pub fn calibrated(folder: &Path, design_text: &str, shape_text: &str, page: bool) -> PathBuf {
     let (design_path, shape_path) = (folder.join("small.toml"), folder.join("slope.toml"));
-    fs::write(&design_path, DESIGN).unwrap();
-    fs::write(&shape_path, SHAPE).unwrap();
+    fs::write(&design_path, design_text).unwrap();
+    fs::write(&shape_path, shape_text).unwrap();
     let input =
         |path: &Path, text: &str| Input::of_bytes(path.display().to_string(), text.as_bytes());
-    let (design, _) = Design::from_toml(DESIGN, &design_path, Need::CALIBRATE).unwrap();
-    let (document, _) = ShapeDocument::from_toml(SHAPE, &shape_path).unwrap();
+    let (design, _) = Design::from_toml(design_text, &design_path, Need::CALIBRATE).unwrap();
+    let (document, _) = ShapeDocument::from_toml(shape_text, &shape_path).unwrap();
     let source = DesignSource {
         design: &design,
-        text: DESIGN,
-        input: &input(&design_path, DESIGN),
+        text: design_text,
+        input: &input(&design_path, design_text),
     };
     let shape = ShapeSource {
         document,
-        input: Some(input(&shape_path, SHAPE)),
+        input: Some(input(&shape_path, shape_text)),
     };
     let mut options = CalibrateOptions::new(folder.join("out"));
     options.keep = false;
@@ -478,7 +478,7 @@ const FORGERIES: &[Forgery] = &[
 ];
 
 /// Whether `verify` finds nothing wrong with the bundle, and whether it checked everything.
-fn passes(verifier: &mut Verifier, folder: &Path) -> (bool, bool) {
+pub fn passes(verifier: &mut Verifier, folder: &Path) -> (bool, bool) {
     let options = VerifyOptions {
         accept_unchecked: true,
     };
@@ -493,7 +493,7 @@ fn passes(verifier: &mut Verifier, folder: &Path) -> (bool, bool) {
 
 fn every_forgery_with_fitting_checksums_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
-    let honest = Parts::of(&calibrated(folder.path(), true));
+    let honest = Parts::of(&calibrated(folder.path(), DESIGN, SHAPE, true));
     let mut verifier = Verifier::default();
     let whole = folder.path().join("whole");
     honest.write(&whole);
@@ -555,7 +555,7 @@ fn as_an_older_program_wrote_it(parts: &mut Parts) {
 /// `verify` once called every difference in wording a fault of the bundle, and the whole of it wrong.
 fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
     let folder = tempfile::tempdir().unwrap();
-    let mut honest = Parts::of(&calibrated(folder.path(), true));
+    let mut honest = Parts::of(&calibrated(folder.path(), DESIGN, SHAPE, true));
     as_an_older_program_wrote_it(&mut honest);
     let run = |parts: &Parts, name: &str, accept_unchecked| {
         let target = folder.path().join(name);
@@ -605,7 +605,7 @@ fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
 
 fn missing_and_changed_inputs_are_stated() {
     let folder = tempfile::tempdir().unwrap();
-    let bundle = calibrated(folder.path(), false);
+    let bundle = calibrated(folder.path(), DESIGN, SHAPE, false);
     let run = |accept_unchecked| {
         let options = VerifyOptions { accept_unchecked };
         Verifier::default()
@@ -650,7 +650,7 @@ const SAMPLED: usize = 13;
 /// every byte of every file.
 fn every_single_byte_edit_of_a_bundle_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
-    let bundle = calibrated(folder.path(), false);
+    let bundle = calibrated(folder.path(), DESIGN, SHAPE, false);
     let manifest = Bundle::open(&bundle).unwrap().manifest;
     let mut names: Vec<&str> = manifest.files.iter().map(|f| f.path.as_str()).collect();
     names.push("manifest.json");

@@ -3,6 +3,7 @@
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
 mod archives;
+mod every_value;
 mod forgeries;
 mod hostile;
 mod loaders;
@@ -14,6 +15,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let rooms = [
         archives::trials(),
+        every_value::trials(),
         forgeries::trials(),
         hostile::trials(),
         loaders::trials(),

@@ -613,6 +613,12 @@ fn large_changes_are_fitted_to_their_end() {
         ),
         ("core.above_mm", "above_mm = 0.0", "above_mm = 2.0", 2.0),
         ("core.below_mm", "below_mm = 10.0", "below_mm = 4.0", -6.0),
+        (
+            "core.clearance_mm",
+            "clearance_mm = 0.0",
+            "clearance_mm = 1.0",
+            1.0,
+        ),
     ] {
         let truth = seed.replacen(from, to, 1);
         assert_ne!(truth, seed, "{key}");

@@ -2,11 +2,14 @@
 //!
 //! Each candidate is changed alone and fitted until it settles: the frame, scales and background by
 //! [`super::fit`], a key of the design by Gauss-Newton steps within its range, the field of the changed
-//! design computed again at every step. The share of the residuals' squares that it takes away is
+//! design computed again at every step, coarsely first and as finely as the scan's own field where the
+//! coarse one would hide what is left. The share of the residuals' squares that it takes away is
 //! reported, and a standard error that holds where the field bends: the larger side of the interval in
 //! which the likelihood stays within the 95 % of one number, over 1.96. Candidates with as many free
 //! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be distinguished by this scan and are
 //! named together.
+
+use rayon::prelude::*;
 
 use super::fit::{self, Fitted, Parameter, parameters};
 use super::keys::{Key, keys};
@@ -30,6 +33,10 @@ const SETTLED: f64 = 1e-7;
 const WIDTH: f64 = 1.96;
 /// Most fields computed to find one end of an interval.
 const PROFILE: usize = 5;
+/// The tolerance of steel at which a key is fitted first.
+const COARSE: f64 = 1e-3;
+/// Where what is left is smaller than so many errors of the coarse field, the finer one decides.
+const RESOLVED: f64 = 10.0;
 /// Below this share of the differences' step the field does not bend.
 const STRAIGHT: f64 = 0.3;
 /// An explanation must take this many times more, a parameter, than noise would.
@@ -68,6 +75,15 @@ struct At {
     by: f64,
     values: Vec<f64>,
     left: f64,
+    /// The claimed relative error of the field.
+    relative_error: f64,
+}
+
+/// A key and the tolerance at which its designs are computed; `None` for the default.
+#[derive(Clone, Copy)]
+struct Search<'a> {
+    key: &'a Key<'a>,
+    tolerance: Option<f64>,
 }
 
 /// Everything that is tried, the most telling first, and the best for its number of parameters.
@@ -200,9 +216,12 @@ impl Task<'_> {
         list.extend(self.group("rotation", &of(&|p| matches!(p, Parameter::Angle(_))))?);
         // The field is proportional to the turns, with linear steel too.
         list.extend(self.scaled("coil.turns", turns));
-        for key in keys(self.design, turns) {
-            list.extend(self.key(&key)?);
-        }
+        let keys = keys(self.design, turns);
+        let settled: Vec<Option<Settled>> = keys
+            .par_iter()
+            .map(|key| self.key(key))
+            .collect::<Result<_, RunError>>()?;
+        list.extend(settled.into_iter().flatten());
         Ok(list)
     }
 
@@ -253,16 +272,21 @@ impl Task<'_> {
 
     /// Measured less computed with the key changed `by`, weighted; `None` where that design cannot be
     /// computed.
-    fn at(&self, key: &Key, by: f64) -> Result<Option<At>, RunError> {
+    fn at(&self, Search { key, tolerance }: Search, by: f64) -> Result<Option<At>, RunError> {
         if !(key.range[0]..=key.range[1]).contains(&by) {
             return Ok(None);
         }
-        match self.computed_for(&(key.changed)(by)) {
-            Ok(computed) => {
+        match self.computed_for(&(key.changed)(by), tolerance) {
+            Ok((computed, relative_error)) => {
                 let pairs = self.scan.values.iter().zip(&computed);
                 let values = self.residuals.weighted(pairs.map(|(m, c)| m - c).collect());
                 let left = squares(&values);
-                Ok(Some(At { by, values, left }))
+                Ok(Some(At {
+                    by,
+                    values,
+                    left,
+                    relative_error,
+                }))
             }
             Err(RunError::Interrupted(stop)) => Err(stop.into()),
             // A changed coil may not be possible: then it is no explanation.
@@ -270,21 +294,26 @@ impl Task<'_> {
         }
     }
 
-    /// Values of another design at the scan's places, [row, quantity].
-    fn computed_for(&self, design: &Design) -> Result<Vec<f64>, RunError> {
-        let scene = Scene::with_tolerance(design, self.request.tolerance)?;
+    /// Values of another design at the scan's places, [row, quantity], and their claimed relative error.
+    fn computed_for(
+        &self,
+        design: &Design,
+        tolerance: Option<f64>,
+    ) -> Result<(Vec<f64>, f64), RunError> {
+        self.progress.check()?;
+        let scene = Scene::with_tolerance(design, tolerance)?;
         let lowest_m = super::lowest_m(self.scan);
         let solved = steel::solve(&scene, scene.tolerances.field, lowest_m)?;
         let model = Model::new(&scene, &solved, self.scan);
         let places = model.places(Pose::default())?;
         let contributions = model.contributions(&places, Pose::default(), self.progress)?;
-        Ok(model.sum(&contributions, |_| 1.0))
+        Ok((model.sum(&contributions, |_| 1.0), solved.point_error()))
     }
 
     /// Change there per unit of the key, by central differences, one-sided at the range's end.
-    fn slope(&self, key: &Key, at: &At) -> Result<Option<Vec<f64>>, RunError> {
-        let up = self.at(key, at.by + key.step)?;
-        let down = self.at(key, at.by - key.step)?;
+    fn slope(&self, search: Search, at: &At) -> Result<Option<Vec<f64>>, RunError> {
+        let up = self.at(search, at.by + search.key.step)?;
+        let down = self.at(search, at.by - search.key.step)?;
         let (high, low) = match (&up, &down) {
             (Some(up), Some(down)) => (up, down),
             (Some(up), None) => (up, at),
@@ -292,53 +321,47 @@ impl Task<'_> {
             (None, None) => return Ok(None),
         };
         let pairs = low.values.iter().zip(&high.values);
-        Ok(Some(
-            pairs.map(|(l, h)| (l - h) / (high.by - low.by)).collect(),
-        ))
+        let slope: Vec<f64> = pairs.map(|(l, h)| (l - h) / (high.by - low.by)).collect();
+        Ok(Some(slope).filter(|slope| norm(slope) > 0.0))
     }
 
     /// The key fitted until it settles.
     fn key(&self, key: &Key) -> Result<Option<Settled>, RunError> {
-        let values = self.residuals.values.clone();
-        let left = squares(&values);
-        let mut at = At {
-            by: 0.0,
-            values,
-            left,
+        let fine = Search {
+            key,
+            tolerance: self.request.tolerance,
         };
-        let Some(mut slope) = self.slope(key, &at)? else {
+        let coarse = Search {
+            key,
+            tolerance: Some(fine.tolerance.map_or(COARSE, |given| given.max(COARSE))),
+        };
+        let Some(mut at) = self.at(coarse, 0.0)? else {
             return Ok(None);
         };
-        if norm(&slope) == 0.0 {
+        let Some(mut slope) = self.slope(coarse, &at)? else {
             return Ok(None);
+        };
+        self.descend(coarse, &mut at, &mut slope)?;
+        let mut search = coarse;
+        if at.left < (RESOLVED * at.relative_error * self.computed()).powi(2)
+            && let Some(finer) = self.at(fine, at.by)?
+        {
+            (search, at) = (fine, finer);
+            self.descend(fine, &mut at, &mut slope)?;
         }
-        for _ in 0..ITERATIONS {
-            let step = dot(&slope, &at.values) / squares(&slope);
-            let Some(next) = self.stepped(key, &at, step)? else {
-                break;
-            };
-            let settled = at.left - next.left <= SETTLED * next.left;
-            // The slope between both serves the next step.
-            let pairs = at.values.iter().zip(&next.values);
-            slope = pairs.map(|(a, b)| (a - b) / (next.by - at.by)).collect();
-            at = next;
-            if settled {
-                break;
-            }
-        }
-        if let Some(fresh) = self.slope(key, &at)?.filter(|slope| norm(slope) > 0.0) {
+        if let Some(fresh) = self.slope(coarse, &at)? {
             slope = fresh;
         }
         let noise = self.noise(at.left, 1);
         let straight = noise / norm(&slope);
-        let sides = [1.0, -1.0].map(|side| self.side(key, &at, side, noise, straight));
+        let sides = [1.0, -1.0].map(|side| self.side(search, &at, side, noise, straight));
         let value = |by: f64| (key.value)(by);
         let mut error = Some(0.0_f64);
         for (sign, side) in [1.0, -1.0].into_iter().zip(sides) {
             let length = side?.map(|s| (value(at.by + sign * s) - value(at.by)).abs() / WIDTH);
             error = error.zip(length).map(|(most, length)| most.max(length));
         }
-        let own = self.relative_error * self.computed() / norm(&slope);
+        let own = at.relative_error * self.computed() / norm(&slope);
         let own = (value(at.by + own) - value(at.by)).abs();
         Ok(Some(Settled {
             name: key.name,
@@ -349,15 +372,34 @@ impl Task<'_> {
         }))
     }
 
+    /// Steps from `at` until one takes nothing away. The slope between two places serves the next step.
+    fn descend(&self, search: Search, at: &mut At, slope: &mut Vec<f64>) -> Result<(), RunError> {
+        for _ in 0..ITERATIONS {
+            let step = dot(slope, &at.values) / squares(slope);
+            let Some(next) = self.stepped(search, at, step)? else {
+                break;
+            };
+            let settled = at.left - next.left <= SETTLED * next.left;
+            let pairs = at.values.iter().zip(&next.values);
+            *slope = pairs.map(|(a, b)| (a - b) / (next.by - at.by)).collect();
+            *at = next;
+            if settled {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// The key after the step, or after part of it; `None` where none leaves less.
-    fn stepped(&self, key: &Key, at: &At, step: f64) -> Result<Option<At>, RunError> {
+    fn stepped(&self, search: Search, at: &At, step: f64) -> Result<Option<At>, RunError> {
+        let key = search.key;
         let mut step = step.clamp(-key.longest, key.longest);
         for _ in 0..HALVINGS {
             let by = (at.by + step).clamp(key.range[0], key.range[1]);
             if by == at.by {
                 return Ok(None);
             }
-            if let Some(next) = self.at(key, by)?.filter(|next| next.left < at.left) {
+            if let Some(next) = self.at(search, by)?.filter(|next| next.left < at.left) {
                 return Ok(Some(next));
             }
             step *= 0.5;
@@ -368,19 +410,19 @@ impl Task<'_> {
     /// How far to one side the likelihood stays within 95 %; `None` where it does so to the range's end.
     fn side(
         &self,
-        key: &Key,
+        search: Search,
         at: &At,
         side: f64,
         noise: f64,
         straight: f64,
     ) -> Result<Option<f64>, RunError> {
         let mut length = WIDTH * straight;
-        if length < STRAIGHT * key.step {
+        if length < STRAIGHT * search.key.step {
             return Ok(Some(length));
         }
         let rise = (WIDTH * noise).powi(2);
         for _ in 0..PROFILE {
-            let Some(there) = self.at(key, at.by + side * length)? else {
+            let Some(there) = self.at(search, at.by + side * length)? else {
                 return Ok(None);
             };
             let share = ((there.left - at.left).max(0.0) / rise).sqrt();

@@ -13,9 +13,9 @@ const PERMEABILITIES: f64 = 1e3;
 pub(super) struct Key<'a> {
     pub name: &'static str,
     /// Its value in the key's unit after a change.
-    pub value: Box<dyn Fn(f64) -> f64 + 'a>,
+    pub value: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
     /// The design after a change.
-    pub changed: Box<dyn Fn(f64) -> Design + 'a>,
+    pub changed: Box<dyn Fn(f64) -> Design + Sync + 'a>,
     /// Least and largest change.
     pub range: [f64; 2],
     /// The longest change in one step.
@@ -30,7 +30,7 @@ fn factor<'a>(
     value: f64,
     [least, most]: [f64; 2],
     step: f64,
-    changed: impl Fn(f64) -> Design + 'a,
+    changed: impl Fn(f64) -> Design + Sync + 'a,
 ) -> Key<'a> {
     Key {
         name,
@@ -46,14 +46,14 @@ fn factor<'a>(
 fn offset<'a>(
     name: &'static str,
     value_mm: f64,
-    reach_mm: f64,
-    changed: impl Fn(f64) -> Design + 'a,
+    [least_mm, reach_mm]: [f64; 2],
+    changed: impl Fn(f64) -> Design + Sync + 'a,
 ) -> Key<'a> {
     Key {
         name,
         value: Box::new(move |by: f64| value_mm + by),
         changed: Box::new(move |by: f64| changed(by * 1e-3)),
-        range: [-reach_mm, reach_mm],
+        range: [least_mm, reach_mm],
         longest: 0.2 * reach_mm,
         step: STEP_STEEL * reach_mm,
     }
@@ -79,18 +79,22 @@ pub(super) fn keys(design: &Design, turns: f64) -> Vec<Key<'_>> {
         }
         changed
     };
+    // A winding is at least one wire thick.
+    let thin_m = (2.0 * design.wire.diameter_m).min(coil.outer_diameter_m - coil.inner_diameter_m);
+    let widest = (coil.outer_diameter_m - thin_m) / coil.inner_diameter_m;
+    let narrowest = (coil.inner_diameter_m + thin_m) / coil.outer_diameter_m;
     let mut list = vec![
         factor(
             "coil.inner_diameter_mm",
             coil.inner_diameter_m * 1e3,
-            lengths,
+            [lengths[0], widest.min(LENGTHS)],
             step,
             move |by| with_coil(&|coil| coil.inner_diameter_m *= by),
         ),
         factor(
             "coil.outer_diameter_mm",
             coil.outer_diameter_m * 1e3,
-            lengths,
+            [narrowest.max(lengths[0]), LENGTHS],
             step,
             move |by| with_coil(&|coil| coil.outer_diameter_m *= by),
         ),
@@ -103,7 +107,7 @@ pub(super) fn keys(design: &Design, turns: f64) -> Vec<Key<'_>> {
         ),
     ];
     if let Some(core) = &design.core {
-        list.extend(core_keys(design, core, 250.0 * coil.length_m, step));
+        list.extend(core_keys(design, core, coil, step));
     }
     let grid = design.array.grid;
     if let Some(grid) = grid.filter(|grid| grid.rows * grid.columns > 1) {
@@ -119,8 +123,9 @@ pub(super) fn keys(design: &Design, turns: f64) -> Vec<Key<'_>> {
     list
 }
 
-/// The numbers of a core.
-fn core_keys<'a>(design: &'a Design, core: &'a Core, reach_mm: f64, step: f64) -> Vec<Key<'a>> {
+/// The numbers of a core in `coil`.
+fn core_keys<'a>(design: &'a Design, core: &'a Core, coil: Coil, step: f64) -> Vec<Key<'a>> {
+    let reach_mm = [-250.0, 250.0].map(|of_length| of_length * coil.length_m);
     let with_core = move |change: &dyn Fn(&mut Core)| {
         let mut changed = design.clone();
         if let Some(core) = &mut changed.core {
@@ -140,6 +145,12 @@ fn core_keys<'a>(design: &'a Design, core: &'a Core, reach_mm: f64, step: f64) -
         Steel::Curve(_) => {}
     }
     list.push(offset(
+        "core.clearance_mm",
+        core.clearance_m * 1e3,
+        [-core.clearance_m * 1e3, 250.0 * coil.inner_diameter_m],
+        move |by_m| with_core(&|core| core.clearance_m += by_m),
+    ));
+    list.push(offset(
         "core.above_mm",
         core.above_m * 1e3,
         reach_mm,
@@ -152,4 +163,35 @@ fn core_keys<'a>(design: &'a Design, core: &'a Core, reach_mm: f64, step: f64) -
         move |by_m| with_core(&|core| core.below_m += by_m),
     ));
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Need;
+
+    /// A winding with an outer diameter below its inner one was computed for seconds, and reported.
+    #[test]
+    fn no_key_makes_a_winding_thinner_than_its_wire() {
+        let text = "name = \"thin\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\n\
+                    length_mm = 100.0\n[wire]\ndiameter_mm = 0.7\n[core]\n[array]\nrows = 1\n\
+                    columns = 1\npitch_mm = 50.0\n";
+        let path = std::path::Path::new("thin.toml");
+        let (design, _) = Design::from_toml(text, path, Need::CALIBRATE).unwrap();
+        let keys = keys(&design, 1429.0);
+        assert_eq!(keys.len(), 7);
+        let clearance = keys.iter().find(|key| key.name == "core.clearance_mm");
+        assert_eq!(clearance.unwrap().range[0], 0.0);
+        for key in &keys {
+            for by in key.range {
+                let coil = (key.changed)(by).coil.unwrap();
+                let thick_m = coil.outer_diameter_m - coil.inner_diameter_m;
+                assert!(
+                    thick_m >= 0.99 * 1.4e-3,
+                    "{} by {by}: {thick_m} m",
+                    key.name
+                );
+            }
+        }
+    }
 }
