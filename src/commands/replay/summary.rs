@@ -223,7 +223,13 @@ impl Bounds {
         self.certificate = self.certificate.max(certificate);
     }
 
-    fn stages(&self, bundle: &Bundle, dynamics: bool) -> BTreeMap<&'static str, StageAccuracy> {
+    /// Currents chosen for uncertainties (`robust`) are not those of eq. 8, whose conditions are looked at.
+    fn stages(
+        &self,
+        bundle: &Bundle,
+        dynamics: bool,
+        robust: bool,
+    ) -> BTreeMap<&'static str, StageAccuracy> {
         let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
             estimate,
             relative_to: relative_to.to_owned(),
@@ -248,6 +254,9 @@ impl Bounds {
                 ),
             ),
         ]);
+        if robust {
+            stages.remove("allocation");
+        }
         let inductances = bundle.manifest.accuracy.get("inductances");
         if let (true, Some(inductances)) = (dynamics, inductances) {
             stages.insert("inductances", inductances.clone());
@@ -266,6 +275,7 @@ impl ReplaySummary {
         warnings: Vec<String>,
     ) -> Self {
         let bundle = &opened.bundle;
+        let robust = opened.renderer.setting().is_some();
         let trajectory = Trajectory {
             t_s: rows.t_s.clone(),
             position_m: rows.position_m.clone(),
@@ -289,11 +299,7 @@ impl ReplaySummary {
             inputs: std::iter::once(opened.input.clone())
                 .chain(source.input)
                 .collect(),
-            made_with: made_with(
-                source.synthesis.as_ref(),
-                dynamics.is_some(),
-                opened.renderer.setting().is_some(),
-            ),
+            made_with: made_with(source.synthesis.as_ref(), dynamics.is_some(), robust),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectorySummary {
                 source: source.source,
@@ -327,13 +333,7 @@ impl ReplaySummary {
             },
             saturated_time_fraction: times.part(rows, Answer::Saturated),
             outside_time_fraction: times.part(rows, Answer::Outside),
-            accuracy: {
-                let mut stages = bounds.stages(bundle, dynamics.is_some());
-                // Currents chosen for uncertainties are not those of eq. 8, whose conditions are looked at there.
-                stages
-                    .retain(|name, _| *name != "allocation" || opened.renderer.setting().is_none());
-                stages
-            },
+            accuracy: bounds.stages(bundle, dynamics.is_some(), robust),
             dynamics,
             warnings,
             files: Vec::new(),
