@@ -652,11 +652,9 @@ mod tests {
             || map.passive_force_n.is_none()
             || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
-            || map
-                .runtime
-                .rendering
-                .as_ref()
-                .is_none_or(|r| r.voltage_v.is_none() || r.requested.is_none())
+            || map.runtime.rendering.as_ref().is_none_or(|r| {
+                r.voltage_v.is_none() || r.requested.is_none() || r.robust.is_none()
+            })
     }
 
     #[test]
