@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Where the force points: static currents and feedback for each requested direction, on the seed's shapes.
 
-    python3 scripts/direction_table.py [PROGRAM]
+    python3 scripts/direction_table.py [PROGRAM [--short]]
 
 For every shape, cores coupled or not, coils that push only or push and pull: the error of the force
 vector at lambda_jnd as a share of the requested force, its sideways part, the angle between the two, the
 power, and the largest lambda at which every point gets its force. PROGRAM is the fluxform binary; without it
-the release build is made and used. Standard library only.
+the release build is made and used. --short prints one line a scene, with static currents of `vertical` and
+feedback of each kind. Standard library only.
 """
 
 import json
@@ -15,6 +16,10 @@ import sys
 
 from feedback_table import DESIGN, ROOT, SHAPES, program
 
+SHORT = "--short" in sys.argv
+SHORT_HEAD = [
+    "shape, coupling, drivers", "vertical, static", "vertical, feedback", "vertical-only, feedback", "normal, feedback",
+]
 HEAD = [
     "shape, coupling, drivers", "requested", "currents", "error", "sideways", "degrees: median, 95 %",
     "points given", "W", "lambda N/m",
@@ -34,7 +39,7 @@ def solved(binary, design, shape, direction):
 
 
 def row(name, requested, currents, rendering, largest):
-    """One line of the table."""
+    """The cells of one line of the table."""
     given = "" if currents == "static" else f"{100 * rendering['reached']:.1f} %"
     cells = [
         name, requested, currents, f"{100 * rendering['error_share']:.1f} %",
@@ -42,6 +47,17 @@ def row(name, requested, currents, rendering, largest):
         f"{rendering['direction_median_deg']:.1f}, {rendering['direction_95_deg']:.1f}", given,
         f"{rendering['mean_power_w']:.1f}", "" if largest is None else f"{largest:.3f}",
     ]
+    return cells
+
+
+def short(rows_of_scene):
+    """One line of the short table: sideways share, degrees, W and lambda of every kind."""
+    kinds = [cells for cells in rows_of_scene if cells[2] == "feedback" or cells[1] == "vertical"]
+    return [kinds[0][0], *("; ".join([*cells[4:6], cells[7], cells[8] or "none"]) for cells in kinds)]
+
+
+def line(cells):
+    """A line of a table."""
     return "| " + " | ".join(cells) + " |"
 
 
@@ -70,8 +86,9 @@ def rows(name, upright, normal):
 def main():
     binary = program()
     full = DESIGN.read_text(encoding="utf-8")
-    print("| " + " | ".join(HEAD) + " |")
-    print("|---" * len(HEAD) + "|")
+    head = SHORT_HEAD if SHORT else HEAD
+    print(line(head))
+    print("|---" * len(head) + "|")
     for coupling in ("full", "none"):
         for drivers in ("push", "push and pull"):
             design = full
@@ -83,8 +100,9 @@ def main():
                 upright, normal = (
                     solved(binary, design, shape, direction) for direction in ("vertical-only", "normal")
                 )
-                for line in rows(f"{upright['shape']}, {coupling}, {drivers}", upright, normal):
-                    print(line, flush=True)
+                found = rows(f"{upright['shape']}, {coupling}, {drivers}", upright, normal)
+                for cells in [short(found)] if SHORT else found:
+                    print(line(cells), flush=True)
 
 
 if __name__ == "__main__":

@@ -457,6 +457,27 @@ static int load_requested(fluxform_bundle *b, const archive *a)
     return 0;
 }
 
+/* What currents chosen for uncertainties need, where the bundle was made with some. */
+static int load_robust(fluxform_bundle *b, const archive *a)
+{
+    const char *name = "robust_setting";
+    array from;
+    size_t n = b->coil_count;
+    int found = find_array(a, name, "<f8", 1, &from);
+    if (found <= 0)
+        return found;
+    if (from.shape[0] != 5)
+        return fail(a, name, "does not have the expected shape");
+    if (!(b->robust_setting = copy(a, name, &from)))
+        return -1;
+    for (size_t i = 0; i < 5; i++)
+        if (!(b->robust_setting[i] >= 0) || b->robust_setting[0] == 0)
+            return fail(a, name, "must hold a price above 0 and nothing below 0");
+    if (!(b->robust_scratch = calloc(2 * n + 9, (n + 1) * sizeof(double)))) /* see fluxform_robust.h */
+        return fail(a, "", "no memory");
+    return 0;
+}
+
 static int load_rendering(fluxform_bundle *b, const archive *a)
 {
     array from;
@@ -475,7 +496,7 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
     for (size_t i = 0; i < b->height_nx * b->height_ny; i++)
         if (b->has_height[i] != 0 && b->has_height[i] != 1)
             return fail(a, "has_height", "must hold 0 or 1");
-    if (load_requested(b, a))
+    if (load_requested(b, a) || load_robust(b, a))
         return -1;
     if (!(b->scratch = calloc(b->coil_count + 1, 21 * sizeof(double)))) /* see fluxform_currents.c */
         return fail(a, "", "no memory");
@@ -581,6 +602,8 @@ void fluxform_bundle_close(fluxform_bundle *bundle)
     free(bundle->gx_t_per_m_per_a);
     free(bundle->gy_t_per_m_per_a);
     free(bundle->requested_direction);
+    free(bundle->robust_setting);
+    free(bundle->robust_scratch);
     free(bundle->gradient_t_per_m_per_a);
     free(bundle->passive_force_n);
     free(bundle->current_min_a);

@@ -53,6 +53,9 @@ typedef struct fluxform_bundle {
     double *static_current_a;     /* the bundle's fixed currents, one a coil of the array */
     double *requested_direction;  /* [y][x][3]: force vector over lambda times the height; NULL: upward alone */
     double sideways_weight;       /* out of reach a sideways error counts as this share of an upward one */
+    /* Price of power, sensor's bound, square and mean of the magnet's strength, square of a driver's error; NULL
+     * for bundles made without uncertainties, as the room that their currents take. */
+    double *robust_setting, *robust_scratch;
     double *scratch;              /* for the functions below that change the bundle */
 } fluxform_bundle;
 
@@ -119,6 +122,11 @@ int fluxform_allocate_vector(fluxform_bundle *bundle, const double *force_per_am
  * one of the answers above; but for the first two all currents are zero. */
 int fluxform_currents(fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *currents,
                       fluxform_step *step);
+
+/* The same with the currents of the least expected error under the uncertainties that the bundle was made with.
+ * The answer is that of the exact position. FLUXFORM_UNABLE also for bundles made without uncertainties. */
+int fluxform_robust_currents(fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *currents,
+                             fluxform_step *step);
 
 #ifdef __cplusplus
 }

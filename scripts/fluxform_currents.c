@@ -495,3 +495,5 @@ int fluxform_currents(fluxform_bundle *b, double x, double y, double z, double *
         *step = s;
     return answer;
 }
+
+#include "fluxform_robust.h"

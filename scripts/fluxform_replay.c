@@ -3,8 +3,10 @@
  * `program map.npz` reads lines "x y z" (m) and prints for each the force per ampere [N/A] of every
  * coil, the unpowered steel's pull [N], the surface's height [m] (0 outside the map), the answer (0 ok, 1 saturated,
  * 2 outside, -1 unable), the force given [N] and the current [A] of every coil; for bundles that request a force
- * vector also the vector wanted, the sideways force given [N] and the vectors of force per ampere of every coil.
- * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes:
+ * vector also the vector wanted, the sideways force given [N] and the vectors of force per ampere of every coil; for
+ * those made with uncertainties the force given along x, y and z [N] and the currents [A] chosen for them.
+ * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes, with a third
+ * argument that of currents chosen for uncertainties:
  *   cc -std=c99 -O2 fluxform_replay.c fluxform_bundle.c fluxform_currents.c -o replay -lm
  */
 #include "fluxform_bundle.h"
@@ -34,12 +36,18 @@ static int tell(fluxform_bundle *bundle, double *force, double *current)
             for (size_t i = 0; i < 3 * bundle->coil_count; i++)
                 printf(" %.17g", vectors[i]);
         }
+        if (bundle->robust_setting) {
+            fluxform_robust_currents(bundle, x, y, z, current, &step);
+            printf(" %.17g %.17g %.17g", step.force_x_n, step.force_y_n, step.force_n);
+            for (size_t i = 0; i < bundle->coil_count; i++)
+                printf(" %.17g", current[i]);
+        }
         printf("\n");
     }
     return 0;
 }
 
-static int measure(fluxform_bundle *bundle, double *current, long repeats)
+static int measure(fluxform_bundle *bundle, double *current, long repeats, int robust)
 {
     size_t count = 0, room = 0;
     double *at = NULL, p[3], sum = 0, best = 1e300;
@@ -60,7 +68,8 @@ static int measure(fluxform_bundle *bundle, double *current, long repeats)
         clock_t start = clock();
         double each;
         for (size_t i = 0; i < count; i++) {
-            fluxform_currents(bundle, at[3 * i], at[3 * i + 1], at[3 * i + 2], current, NULL);
+            (robust ? fluxform_robust_currents : fluxform_currents)(bundle, at[3 * i], at[3 * i + 1],
+                                                                    at[3 * i + 2], current, NULL);
             sum += current[0];
         }
         each = (double)(clock() - start) / CLOCKS_PER_SEC / (double)count * 1e9;
@@ -77,8 +86,8 @@ int main(int argc, char **argv)
     char message[256];
     double *force;
     int outcome;
-    if (argc != 2 && argc != 3) {
-        fprintf(stderr, "usage: %s map.npz [REPEATS] < points\n", argv[0]);
+    if (argc < 2 || argc > 4) {
+        fprintf(stderr, "usage: %s map.npz [REPEATS [robust]] < points\n", argv[0]);
         return 2;
     }
     if (fluxform_bundle_open(&bundle, argv[1], message, sizeof message)) {
@@ -90,7 +99,7 @@ int main(int argc, char **argv)
         return 3;
     }
     outcome = argc == 2 ? tell(&bundle, force, force + bundle.coil_count)
-                        : measure(&bundle, force, strtol(argv[2], NULL, 10));
+                        : measure(&bundle, force, strtol(argv[2], NULL, 10), argc == 4);
     free(force);
     fluxform_bundle_close(&bundle);
     return outcome;

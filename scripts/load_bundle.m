@@ -52,6 +52,7 @@ function bundle = loaded(folder)
     bundle.passive_force = @(points_m) passive_force(map, points_m);
     bundle.height = @(points_m) height(map, points_m);
     bundle.currents = @(points_m) feedback(map, points_m);
+    bundle.robust_currents = @(points_m) robust_feedback(map, points_m);
 end
 
 function force = force_per_ampere(map, points_m)
@@ -229,6 +230,129 @@ function [currents, force, answers] = feedback(map, points_m)
                                          map.current_min_a, map.current_max_a, total);
         force(p) = per_ampere(p, :) * currents(p, :).' + passive(p);
         answers{p} = words{1 + met};
+    end
+end
+
+function [currents, force, answers] = robust_feedback(map, points_m)
+% As feedback, with the currents of the least expected error under the uncertainties that the bundle was made
+% with: the algorithm of src/lambda/uncertainty/error_form.rs.
+    if ~isfield(map, 'robust_setting')
+        error('fluxform:bundle', 'map.npz holds no robust_setting: the bundle was made without uncertainties');
+    end
+    [currents, force, answers] = feedback(map, points_m);
+    total = Inf;
+    if isfield(map, 'total_current_max_a')
+        total = map.total_current_max_a;
+    end
+    vector = isfield(map, 'requested_direction');
+    requested = requested_force(map, points_m);
+    setting = map.robust_setting;
+    low = [map.x_m(1), map.y_m(1), map.z_m(1)];
+    high = [map.x_m(end), map.y_m(end), map.z_m(end)];
+    % The rule of degree 5 of Hammer and Stroud over a box.
+    diagonals = 1 - 2 * [bitget(0:7, 1); bitget(0:7, 2); bitget(0:7, 3)].';
+    rule = [kron(0.7958224257542215 * eye(3), [1; -1]); 0.7587869106393281 * diagonals];
+    weights = [repmat(40 / 361, 1, 6), repmat(121 / 2888, 1, 8)];
+    if setting(2) == 0
+        rule = zeros(1, 3);
+        weights = 1;
+    end
+    for p = find(~strcmp(answers, 'outside')).'
+        places = points_m(p, 1:3) + setting(2) * rule;
+        places = min(max(places, repmat(low, size(places, 1), 1)), repmat(high, size(places, 1), 1));
+        pull = passive_force(map, places);
+        form.lower = map.current_min_a.';
+        form.upper = map.current_max_a.';
+        form.linear = zeros(numel(form.upper), 1);
+        form.matrix = diag(setting(1) * map.resistance_ohm);
+        for k = 1:numel(weights)
+            [rows, wanted] = components(map, places(k, :), vector, requested(p, :), pull(k));
+            square = weights(k) * setting(3);
+            form.matrix = form.matrix + square * (rows * rows.') + diag(square * setting(5) * sum(rows .^ 2, 2));
+            form.linear = form.linear + weights(k) * setting(4) * (rows * wanted);
+        end
+        currents(p, :) = least_expected_error(form, total, currents(p, :).').';
+        own = components(map, points_m(p, 1:3), vector, requested(p, :), 0);
+        force(p, :) = currents(p, :) * own;
+        force(p, end) = force(p, end) + passive_force(map, points_m(p, 1:3));
+    end
+end
+
+function [rows, wanted] = components(map, place, vector, requested, pull)
+% Forces per ampere at a place, [coil, component], and what the currents are to give.
+    wanted = requested.' - [0; 0; pull];
+    if vector
+        rows = reshape(force_vectors_per_ampere(map, place), [], 3);
+    else
+        rows = force_per_ampere(map, place).';
+        wanted = wanted(3);
+    end
+end
+
+function currents = least_expected_error(form, total, currents)
+% The least value within the box and the limit of the sum, from currents within both.
+    currents = within_box(form, 0, currents);
+    if sum(currents) <= total * (1 + 1e-12)
+        return
+    end
+    % No current flows where the multiplier outweighs every pull.
+    low = 0;
+    high = max([0; form.linear]);
+    within = within_box(form, high, zeros(size(currents)));
+    for round = 1:80
+        middle = 0.5 * (low + high);
+        currents = within_box(form, middle, currents);
+        if sum(currents) > total
+            low = middle;
+            continue
+        end
+        high = middle;
+        within = currents;
+        if sum(currents) >= total * (1 - 1e-12)
+            break
+        end
+    end
+    currents = within;
+end
+
+function currents = within_box(form, price, currents)
+% The least value of I'AI - 2 (b - price)'I over the box, from currents within it.
+    free = find(currents > form.lower & currents < form.upper).';
+    for turn = 1:20 * numel(currents) + 20
+        others = currents;
+        others(free) = 0;
+        rest = form.linear - price - form.matrix * others;
+        aim = form.matrix(free, free) \ rest(free);
+        share = 1;
+        meets = 0;
+        for k = 1:numel(free)
+            own = currents(free(k));
+            limits = [form.lower(free(k)), form.upper(free(k))];
+            limit = limits(1 + (aim(k) > own));
+            part = (limit - own) / (aim(k) - own);
+            if (aim(k) > limits(2) || aim(k) < limits(1)) && part < share
+                share = part;
+                meets = k;
+                bound = limit;
+            end
+        end
+        moved = currents(free) + share * (aim - currents(free));
+        currents(free) = min(max(moved, form.lower(free)), form.upper(free));
+        if meets > 0
+            currents(free(meets)) = bound;
+            free(meets) = [];
+            continue
+        end
+        slope = form.matrix * currents - form.linear + price;
+        bulk = abs(form.matrix) * abs(currents) + abs(form.linear) + price;
+        pull = abs(slope) .* ((slope < 0 & currents < form.upper) | (slope > 0 & currents > form.lower));
+        pull(pull <= 1e-13 * bulk) = 0;
+        pull(free) = 0;
+        [most, worst] = max(pull);
+        if most == 0
+            break
+        end
+        free(end + 1) = worst;
     end
 end
 
@@ -829,7 +953,8 @@ function map = read_npz(path)
              'current_max_a', 'resistance_ohm', 'gradient_t_per_m_per_a', 'field_t_per_a', 'passive_force_n', ...
              'working_point_gz_t_per_m', 'total_current_max_a', 'lambda_n_per_m', 'height_x_m', 'height_y_m', ...
              'height_m', 'has_height', 'static_current_a', 'inductance_h', 'voltage_v', 'schema_version', ...
-             'gx_t_per_m_per_a', 'gy_t_per_m_per_a', 'requested_direction', 'sideways_weight'};
+             'gx_t_per_m_per_a', 'gy_t_per_m_per_a', 'requested_direction', 'sideways_weight', ...
+             'robust_setting'};
     file = fopen(path, 'r', 'ieee-le');
     closing = onCleanup(@() fclose(file));
     fseek(file, 0, 'eof');
@@ -951,7 +1076,7 @@ function check(map, bundle)
     grid = [numel(map.z_m), numel(map.y_m), numel(map.x_m)];
     wanted = {'gz_t_per_m_per_a', [numel(map.coil), grid]; 'gx_t_per_m_per_a', [numel(map.coil), grid]; ...
               'gy_t_per_m_per_a', [numel(map.coil), grid]; 'requested_direction', [surface, 3]; ...
-              'sideways_weight', [1, 1]; ...
+              'sideways_weight', [1, 1]; 'robust_setting', [1, 5]; ...
               'gradient_t_per_m_per_a', [numel(map.coil), grid, 3, 3]; ...
               'passive_force_n', grid; 'moment_a_m2', [1, 3]; 'current_max_a', [1, coils]; ...
               'current_min_a', [1, coils]; 'resistance_ohm', [1, coils]; 'lambda_n_per_m', [1, 1]; ...
@@ -976,6 +1101,9 @@ function check(map, bundle)
     if isfield(map, 'requested_direction') && ~(isfield(map, 'gx_t_per_m_per_a') && isfield(map, 'height_m') && ...
        isfield(map, 'sideways_weight') && map.sideways_weight >= 1e-6 && map.sideways_weight <= 1)
         error('fluxform:bundle', 'map.npz: requested_direction needs gx_t_per_m_per_a and a sideways_weight of 1e-6 to 1');
+    end
+    if isfield(map, 'robust_setting') && (any(map.robust_setting < 0) || map.robust_setting(1) == 0)
+        error('fluxform:bundle', 'map.npz: robust_setting must hold a price above 0 and nothing below 0');
     end
     if isfield(map, 'height_m')
         if ~isfield(map, 'has_height') || ~all(map.has_height(:) == 0 | map.has_height(:) == 1)

@@ -79,6 +79,10 @@ points = csvread('positions.csv');
 [~, code] = ismember(answer, {'ok', 'saturated', 'outside'});
 found = [bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), ...
          current, force(:, end), code];
+if isfield(bundle.map, 'robust_setting')
+    [chosen, given] = bundle.robust_currents(points);
+    found = [chosen, given(:, end), found];
+end
 found(isnan(found)) = 0;
 format = [repmat('%.17g ', 1, columns(found)), '\\n'];
 printf(format, found.');
@@ -91,6 +95,13 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         ("short axes", false, true, [2, 3, 1]),
         ("upright vector", false, false, [13, 17, 11]),
         ("tilted vector with pull", true, true, [13, 9, 11]),
+        ("upright uncertain with pull", false, true, [13, 17, 11]),
+        (
+            "tilted vector, uncertain with pull",
+            true,
+            true,
+            [13, 9, 11],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let mut sample = sample(tilted, samples);
@@ -100,10 +111,14 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         if name.contains("vector") {
             sample = sample.with_vectors();
         }
+        if name.contains("uncertain") {
+            sample = sample.with_uncertainty(0.004);
+        }
         let target = folder.path().join("bundle");
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
         let mut renderer = Renderer::new(&bundle).unwrap();
+        let mut robust = Renderer::robust(&bundle).ok();
         let at = positions(&bundle);
         let table: String = at
             .iter()
@@ -119,6 +134,18 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         for (position, found) in at.iter().zip(&found) {
             let coils = bundle.coil_count();
             let mut want = vec![f64::NAN; coils];
+            let mut found = &found[..];
+            if let Some(robust) = &mut robust {
+                let step = robust.step(*position, &mut want);
+                want.push(step.force_n);
+                let chosen;
+                (chosen, found) = found.split_at(coils + 1);
+                let scale = want.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                for (f, w) in chosen.iter().zip(&want) {
+                    assert!((f - w).abs() <= 1e-12 * scale, "{name}: {f} and {w}");
+                }
+                want.truncate(coils);
+            }
             outside += usize::from(!bundle.force_per_ampere(*position, &mut want));
             want.push(bundle.passive_force_n(*position).unwrap_or(0.0));
             let [x, y, _] = *position;

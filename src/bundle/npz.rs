@@ -20,10 +20,11 @@ use super::array_check::{BEYOND, LARGEST, all_finite, all_within, bad, check_nod
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
 use super::rendering::{
-    DIRECTION, HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, Rendering,
-    Requested, SIDEWAYS_WEIGHT, STATIC_CURRENT, VOLTAGE,
+    DIRECTION, HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, ROBUST, Rendering,
+    Requested, SIDEWAYS_WEIGHT, STATIC_CURRENT, VOLTAGE, robust_numbers,
 };
 use super::stored;
+use fluxform_lambda::uncertainty::RobustRuntime;
 
 pub use super::array_check::NpzError;
 
@@ -321,6 +322,9 @@ impl Archive {
         if let Some(voltage) = rendering.voltage_v {
             self.put(VOLTAGE, &[], &[voltage])?;
         }
+        if let Some(robust) = &rendering.robust {
+            self.put(ROBUST, &[5], &robust_numbers(robust))?;
+        }
         let Some(requested) = &rendering.requested else {
             return Ok(());
         };
@@ -471,6 +475,15 @@ impl Arrays<'_> {
             inductance_h: self.need(INDUCTANCE, &[coils, coils])?,
             voltage_v: self.scalar(VOLTAGE)?,
             requested,
+            robust: self
+                .get::<f64>(ROBUST, &[Some(5)])?
+                .map(|numbers| RobustRuntime {
+                    price_n2_per_w: numbers[0],
+                    sensor_m: numbers[1],
+                    square: numbers[2],
+                    mean: numbers[3],
+                    driver_square: numbers[4],
+                }),
         }))
     }
 
@@ -540,6 +553,13 @@ mod tests {
                     requested: Some(Requested {
                         direction: values(18, 1.1).into_iter().map(|v| 0.5 * v).collect(),
                         sideways_weight: 0.1,
+                    }),
+                    robust: Some(RobustRuntime {
+                        price_n2_per_w: 3e-5,
+                        sensor_m: 0.004,
+                        square: 0.98,
+                        mean: 0.99,
+                        driver_square: 1e-4,
                     }),
                 }),
             },
@@ -632,11 +652,9 @@ mod tests {
             || map.passive_force_n.is_none()
             || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
-            || map
-                .runtime
-                .rendering
-                .as_ref()
-                .is_none_or(|r| r.voltage_v.is_none() || r.requested.is_none())
+            || map.runtime.rendering.as_ref().is_none_or(|r| {
+                r.voltage_v.is_none() || r.requested.is_none() || r.robust.is_none()
+            })
     }
 
     #[test]

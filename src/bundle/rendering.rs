@@ -10,10 +10,15 @@
 //! requested force over lambda times the height, and `sideways_weight` (no dimension): out of reach
 //! the nearest force is given, a sideways error counting as that share of an upward one. Such
 //! bundles hold the maps of all three components.
+//!
+//! Bundles made with uncertainties hold `robust_setting` (5): price of power (N^2/W), how far the magnet may be
+//! from where it is measured (m), mean square and mean of its strength over the stated one, mean square of a
+//! driver's relative error.
 
 use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
 use super::table::PointRow;
+use fluxform_lambda::uncertainty::RobustRuntime;
 
 pub(super) const HEIGHT_X: &str = "height_x_m";
 pub(super) const HEIGHT_Y: &str = "height_y_m";
@@ -24,6 +29,7 @@ pub(super) const INDUCTANCE: &str = "inductance_h";
 pub(super) const VOLTAGE: &str = "voltage_v";
 pub(super) const DIRECTION: &str = "requested_direction";
 pub(super) const SIDEWAYS_WEIGHT: &str = "sideways_weight";
+pub(super) const ROBUST: &str = "robust_setting";
 
 /// A smaller sideways weight could not be distinguished from rounding.
 const LEAST_WEIGHT: f64 = 1e-6;
@@ -41,6 +47,8 @@ pub struct Rendering {
     pub voltage_v: Option<f64>,
     /// What all three components of the force are to be; `None` where the upward one alone is requested.
     pub requested: Option<Requested>,
+    /// What currents chosen for the uncertainties need; `None` where none were given.
+    pub robust: Option<RobustRuntime>,
 }
 
 /// The force vector that is requested over a surface.
@@ -67,6 +75,8 @@ impl Rendering {
         let requested = self.requested.as_ref();
         let direction = requested.map_or(&[][..], |requested| &requested.direction);
         let weight = requested.map(|requested| requested.sideways_weight);
+        let robust = self.robust.as_ref().map(robust_numbers);
+        let robust = robust.as_ref().map_or(&[][..], |numbers| numbers);
         let of_direction = requested.map_or(0, |_| nx.saturating_mul(ny).saturating_mul(3));
         for (name, values, count) in [
             (HEIGHT_X, &heights.x_m[..], nx),
@@ -78,6 +88,7 @@ impl Rendering {
             (VOLTAGE, voltage, voltage.len()),
             (DIRECTION, direction, of_direction),
             (SIDEWAYS_WEIGHT, weight.as_slice(), weight.iter().len()),
+            (ROBUST, robust, robust.len()),
         ] {
             if values.len() != count {
                 let message = format!("must hold {count} numbers, holds {}", values.len());
@@ -102,8 +113,23 @@ impl Rendering {
         if weight.is_some_and(|weight| !(LEAST_WEIGHT..=1.0).contains(&weight)) {
             return Err(bad(SIDEWAYS_WEIGHT, "must lie between 1e-6 and 1"));
         }
+        if robust.iter().any(|number| *number < 0.0) || robust.first() == Some(&0.0) {
+            return Err(bad(ROBUST, "must hold a price above 0 and nothing below 0"));
+        }
         Ok(())
     }
+}
+
+/// The numbers of `robust_setting`, in its order.
+pub(super) fn robust_numbers(of: &RobustRuntime) -> [f64; 5] {
+    let RobustRuntime {
+        price_n2_per_w,
+        sensor_m,
+        square,
+        mean,
+        driver_square,
+    } = *of;
+    [price_n2_per_w, sensor_m, square, mean, driver_square]
 }
 
 /// A surface's heights on a grid; not everywhere is a surface.

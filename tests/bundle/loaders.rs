@@ -96,27 +96,54 @@ found = zip(points, bundle.force_per_ampere(points), bundle.passive_force(points
 for point, row, pull, height, currents, force, answer in found:
     code = 'ok saturated outside'.split().index(answer)
     height = 0 if np.isnan(height) or code == 2 else height
-    if 'requested_direction' not in bundle.map:
-        print(*map(repr, map(float, [*row, pull, height, code, force, *currents])))
-        continue
-    wanted = (code != 2) * bundle.requested_force([point])[0]
-    vectors = bundle.force_vectors_per_ampere([point])[0].ravel()
-    print(*map(repr, map(float, [*row, pull, height, code, force[2], *currents, *wanted, *force[:2], *vectors])))
+    vector = 'requested_direction' in bundle.map
+    line = [*row, pull, height, code, force[2] if vector else force, *currents]
+    if vector:
+        wanted = (code != 2) * bundle.requested_force([point])[0]
+        line += [*wanted, *force[:2], *bundle.force_vectors_per_ampere([point])[0].ravel()]
+    if 'robust_setting' in bundle.map:
+        chosen, given, _ = bundle.currents([point], robust=True)
+        line += [*(given[0] if vector else [0, 0, given[0]]), *chosen[0]]
+    print(*map(repr, map(float, line)))
 ";
 
 /// Where in a line forces per ampere and pull, height, answer, force, and currents begin.
 const PARTS: [usize; 6] = [0, COILS + 1, COILS + 2, COILS + 3, COILS + 4, 2 * COILS + 4];
 /// The same of a force vector: requested, sideways given, and the vectors per ampere.
 const VECTOR_PARTS: [usize; 4] = [2 * COILS + 4, 2 * COILS + 7, 2 * COILS + 9, 5 * COILS + 9];
+/// At the end of a line: the force given and the currents chosen for uncertainties.
+const ROBUST: usize = COILS + 3;
 const COILS: usize = 4;
 const FORCE: usize = 3;
 const SIDEWAYS_FORCE: usize = 6;
 
 fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
     assert_eq!(found.len(), want.len(), "{loader}");
-    let mut worst = [0.0f64; 8];
+    let mut worst = [0.0f64; 10];
     for (found, want) in found.iter().zip(want) {
         assert_eq!(found.len(), want.len(), "{loader}");
+        let uncertain = [2 * COILS + 4, 5 * COILS + 9].map(|plain| plain + ROBUST);
+        if uncertain.contains(&want.len()) {
+            let [a, b] = [found, want].map(|line| line.split_at(line.len() - ROBUST).1);
+            let most = |of: &[f64]| of.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let sum: f64 = b[3..].iter().map(|current| current.abs()).sum();
+            // A force is a sum of terms of both signs.
+            let force = most(&want[..COILS]) * sum + want[COILS].abs();
+            for (part, range, scale) in [(8, 0..3, force), (9, 3..ROBUST, most(&b[3..]))] {
+                for (f, w) in a[range.clone()].iter().zip(&b[range]) {
+                    let apart = (f - w).abs() / scale.max(f64::MIN_POSITIVE);
+                    assert!(apart <= 1e-12, "{loader}, part {part}: {f} and {w}");
+                    worst[part] = worst[part].max(apart);
+                }
+            }
+        }
+        let plain = want.len()
+            - if uncertain.contains(&want.len()) {
+                ROBUST
+            } else {
+                0
+            };
+        let (found, want) = (&found[..plain], &want[..plain]);
         let vector = VECTOR_PARTS.windows(2).filter(|ends| ends[1] <= want.len());
         for (part, ends) in PARTS.windows(2).chain(vector).enumerate() {
             // A force that cancels the pull is compared with the pull.
@@ -138,8 +165,8 @@ fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
         }
     }
     eprintln!(
-        "{loader}: largest differences of forces per ampere, heights, answers, forces and \
-         currents, relative to the largest at the point: {}",
+        "{loader}: largest differences of forces per ampere, heights, answers, forces, currents, the same of \
+         vectors, and force and currents chosen for uncertainties, relative to the largest at the point: {}",
         worst.map(|w| format!("{w:.1e}")).join(" ")
     );
 }
@@ -192,6 +219,14 @@ fn forces_on_samples(other: Option<&Loader>) {
         ("short axes", false, true, [2, 3, 1]),
         ("upright vector", false, false, [13, 17, 11]),
         ("tilted vector with pull", true, true, [13, 9, 11]),
+        ("upright uncertain with pull", false, true, [13, 17, 11]),
+        ("upright uncertain vector", false, false, [13, 17, 11]),
+        (
+            "tilted vector with pull, the place uncertain",
+            true,
+            true,
+            [13, 9, 11],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("bundle");
@@ -202,11 +237,16 @@ fn forces_on_samples(other: Option<&Loader>) {
         if name.contains("vector") {
             sample = sample.with_vectors();
         }
+        if name.contains("uncertain") {
+            sample = sample.with_uncertainty(if pulled { 0.004 } else { 0.0 });
+        }
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
         let at = positions(&bundle.map);
         let mut outside = 0;
         let mut renderer = Renderer::new(&bundle).unwrap();
+        let mut robust = Renderer::robust(&bundle).ok();
+        assert_eq!(robust.is_some(), name.contains("uncertain"));
         let mut answers = [0; 3];
         let want: Vec<Vec<f64>> = at
             .iter()
@@ -227,8 +267,14 @@ fn forces_on_samples(other: Option<&Loader>) {
                 assert!(renderer.certificate(&step, &currents) <= met);
                 answers[answer] += 1;
                 force.extend([step.height_m, answer as f64, step.force_n]);
-                force.extend(currents);
+                force.extend(&currents);
                 force.extend(vector_of(&bundle, &step, p));
+                if let Some(robust) = &mut robust {
+                    let step = robust.step(p, &mut currents);
+                    force.extend(step.sideways.map_or([0.0; 2], |sideways| sideways.force_n));
+                    force.push(step.force_n);
+                    force.extend(currents);
+                }
                 force
             })
             .collect();

@@ -106,6 +106,54 @@ fn a_design_states_its_uncertainties_and_flags_take_their_place() {
     }
 }
 
+/// A bundle held no setting, so a runtime knew the currents of least power alone.
+#[test]
+fn a_replay_commands_the_currents_that_its_bundle_was_made_for() {
+    let place = Place::new();
+    let shape = flat(&place);
+    let calibrated = |flags: &[&str]| {
+        let args = ["calibrate", SEED, shape, "--force"];
+        place.run(&[&args[..], flags].concat()).ends(0);
+    };
+    let replay = [
+        "replay",
+        "results/seed_air/flat",
+        "--synthesize",
+        "explore",
+        "--duration",
+        "30",
+        "--force",
+        "--robust",
+    ];
+    calibrated(&[]);
+    place
+        .run(&replay)
+        .ends(3)
+        .says(&["holds no setting for uncertainties"]);
+    calibrated(&["--sensor-error", "4mm"]);
+    let found = place
+        .run(&[&replay[..], &["--format", "json"]].concat())
+        .ends(0)
+        .json();
+    let felt = &found["force"]["felt"];
+    let of = |kind: &str| number(felt, &format!("/{kind}"));
+    assert!(of("draws") >= 1000.0);
+    assert!(
+        of("robust/promised") < 0.9 * of("feedback/promised"),
+        "{felt}"
+    );
+    for currents in ["robust", "feedback"] {
+        let [promised, realised] =
+            ["promised", "realised"].map(|kind| of(&format!("{currents}/{kind}")));
+        assert!((realised / promised - 1.0).abs() < 0.1, "{felt}");
+    }
+    assert_eq!(found["made_with"]["robust"], true);
+    let plain = place.run(&[&replay[..7], &["--format", "json"]].concat());
+    let plain = plain.ends(0).json();
+    assert_eq!(plain["force"]["felt"], Value::Null);
+    assert_eq!(plain["made_with"]["robust"], Value::Null);
+}
+
 #[test]
 fn bounds_beyond_the_map_or_all_sense_are_refused() {
     let place = Place::new();

@@ -6,6 +6,7 @@ use std::path::Path;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::{Criterion, ForceConstants};
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
+use fluxform_base::uncertainty::Uncertainty;
 use fluxform_bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use fluxform_bundle::atomic::WriteError;
 use fluxform_bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
@@ -15,6 +16,7 @@ use fluxform_bundle::rendering::{HeightGrid, Rendering, Requested};
 use fluxform_bundle::table::{CurrentRow, PointRow};
 use fluxform_bundle::timing::StageSeconds;
 use fluxform_bundle::write::{BundleContent, write_bundle};
+use fluxform_lambda::uncertainty::RobustRuntime;
 use fluxform_numerics::axis::Axis;
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.
@@ -120,6 +122,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         inductance_h: inductance_h.concat(),
         voltage_v: Some(36.0),
         requested: None,
+        robust: None,
     });
     let accuracy = BTreeMap::from([(
         "map".to_owned(),
@@ -320,6 +323,22 @@ impl Sample {
             rim_points: 0,
             static_currents: "the upward force alone".to_owned(),
         });
+        self
+    }
+
+    /// The sample of a bundle made for a sensor that is off by up to `sensor_m`, with warm magnets and drivers.
+    ///
+    /// # Panics
+    /// For a sample without rendering.
+    pub fn with_uncertainty(mut self, sensor_m: f64) -> Self {
+        let given = Uncertainty {
+            sensor_m,
+            tilt_deg: 0.0,
+            heat_c: 20.0,
+            driver: 0.02,
+        };
+        let rendering = self.map.runtime.rendering.as_mut().unwrap();
+        rendering.robust = Some(RobustRuntime::new(&given, 3e-4));
         self
     }
 

@@ -29,6 +29,7 @@ use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::Settings;
+use crate::lambda::uncertainty::RobustRuntime;
 use crate::map::FieldMap;
 use crate::map::tabulate::Grid;
 use crate::progress::Progress;
@@ -581,6 +582,11 @@ impl Calibration<'_> {
             inductance_h: circuit.inductance_h.concat(),
             voltage_v: circuit.voltage_v,
             requested: requested_force::on_grid(self.force(), points),
+            robust: lambda
+                .file
+                .uncertainty
+                .as_ref()
+                .map(|study| RobustRuntime::new(&study.given, study.robust.price_n2_per_w)),
         });
         Runtime {
             rendering,

@@ -79,6 +79,10 @@ pub struct Replay {
     /// the supply's voltage
     #[arg(long)]
     dynamics: bool,
+    /// Command the currents of the least expected error under the uncertainties that the bundle was made with,
+    /// and state the felt error with and without them
+    #[arg(long)]
+    robust: bool,
     /// Draw finger, forces and currents over time to this file (.svg, .png or .pdf)
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
@@ -117,6 +121,11 @@ impl Replay {
         };
         table_or_drawing(&self.out, self.plot.as_ref())?;
         let opened = Opened::new(&self.bundle)?;
+        let opened = if self.robust {
+            opened.robust()?
+        } else {
+            opened
+        };
         let (trajectory, source) = self.trajectory(&opened)?;
         let inputs: Vec<_> = std::iter::once(opened.input.clone())
             .chain(source.input.clone())
@@ -203,7 +212,8 @@ impl Replay {
         reads: &[PathBuf],
     ) -> Result<Option<Overwrite>, Failure> {
         let Some(files) = files else { return Ok(None) };
-        let made_with = synthesize::made_with(source.synthesis.as_ref(), self.dynamics);
+        let made_with =
+            synthesize::made_with(source.synthesis.as_ref(), self.dynamics, self.robust);
         let overwrite = Overwrite::new(self.writing.force, files.record(), inputs)
             .made_with(&made_with)
             .protecting(reads.iter());

@@ -5,6 +5,7 @@
 //! the commanded ones.
 
 pub(crate) mod command;
+mod felt;
 pub mod output;
 mod plausible;
 pub mod renderer;
@@ -23,6 +24,7 @@ use crate::coil::drive::Drive;
 use crate::commands::calibrate::DESIGN_FILE;
 use crate::design::{Design, Driver, Need};
 use crate::progress::Progress;
+use felt::Felt;
 use renderer::{Renderer, RendererError, Step};
 use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
 use synthesize::Synthesis;
@@ -56,7 +58,9 @@ impl Opened {
                     "{message}; see lambda.json there, and calibrate with other limits or another \
                      shape"
                 )),
-                RendererError::Circuit(_) | RendererError::Points => RunError::Input(message),
+                RendererError::Circuit(_)
+                | RendererError::Points
+                | RendererError::NoUncertainty => RunError::Input(message),
             }
         })?;
         let input = Input {
@@ -68,6 +72,20 @@ impl Opened {
             input,
             renderer,
         })
+    }
+
+    /// With currents chosen for the uncertainties that the bundle was made with.
+    ///
+    /// # Errors
+    /// A bundle made without any.
+    pub fn robust(mut self) -> Result<Self, RunError> {
+        self.renderer = Renderer::robust(&self.bundle).map_err(|error| {
+            RunError::Input(format!(
+                "{}: {error}; calibrate again with [uncertainty] in the design, or with --sensor-error 4mm",
+                self.bundle.folder.display()
+            ))
+        })?;
+        Ok(self)
     }
 
     /// The bundle's files, its seconds, which no manifest lists, among them.
@@ -93,6 +111,14 @@ impl Opened {
             Driver::Voltage => None,
             Driver::Current => Some(design.supply.bandwidth_hz),
         }
+    }
+
+    /// The sums of the felt error along so many positions, where currents are chosen for uncertainties.
+    fn felt(&self, positions: usize) -> Option<Felt> {
+        self.renderer.setting()?;
+        let study = self.bundle.lambda.uncertainty.as_ref()?;
+        let ohm = &self.bundle.map.runtime.resistance_ohm;
+        Some(Felt::new(study.given, ohm, positions))
     }
 
     /// The circuit of the bundle's coils, without current.
@@ -183,9 +209,13 @@ pub fn run(
             .collect(),
         bounds: summary::Bounds::of(&opened.bundle),
         bandwidth_hz,
+        felt: opened.felt(trajectory.len()),
     };
     let rows = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
-    let summary = ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
+    let felt = follower.felt.as_ref().and_then(Felt::summary);
+    let mut summary =
+        ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
+    summary.force.felt = felt;
     Ok(ReplayReport {
         rows,
         summary,
@@ -202,6 +232,8 @@ struct Follower {
     bounds: summary::Bounds,
     /// That of the current loop, Hz, where the drivers close one.
     bandwidth_hz: Option<f64>,
+    /// Where currents are chosen for uncertainties.
+    felt: Option<Felt>,
 }
 
 impl Follower {
@@ -274,6 +306,9 @@ impl Follower {
                 let certificate = self.renderer.certificate(step, command);
                 let largest = self.renderer.map().largest_near_n_per_a(position[2]);
                 self.bounds.add(certificate, largest, &flowing);
+                if let Some(felt) = &mut self.felt {
+                    felt.add(&self.renderer, position, step, command);
+                }
             }
         }
         if drive.is_some() {

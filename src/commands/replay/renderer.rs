@@ -4,10 +4,13 @@ use crate::bundle::force_map::ForceMap;
 use crate::bundle::load::Bundle;
 use crate::bundle::rendering::HeightGrid;
 use crate::bundle::replay::Answer;
-use crate::lambda::{Allocation, Allocator, Reach, VECTOR_MET, VectorAllocation, VectorAllocator};
+use crate::lambda::uncertainty::{RobustForm, RobustRuntime};
+use crate::lambda::{
+    Allocation, Allocator, ForceProblem, Reach, VECTOR_MET, VectorAllocation, VectorAllocator,
+};
 
 /// Follows a finger on a bundle's object. Nothing is allocated on the heap after
-/// [`Renderer::new`].
+/// [`Renderer::new`]; currents chosen for the uncertainties take some memory at each step.
 #[derive(Debug, Clone)]
 pub struct Renderer {
     map: ForceMap,
@@ -17,6 +20,23 @@ pub struct Renderer {
     force_n_per_a: Vec<f64>,
     /// Where all three components of the force are requested.
     vector: Option<VectorPart>,
+    /// Where currents are chosen for the uncertainties.
+    robust: Option<RobustPart>,
+}
+
+/// What currents chosen for the uncertainties need.
+#[derive(Debug, Clone)]
+struct RobustPart {
+    form: RobustForm,
+    resistance_ohm: Vec<f64>,
+    lower_a: Vec<f64>,
+    upper_a: Vec<f64>,
+    total_max_a: Option<f64>,
+    /// Forces per ampere at a place beside the measured one, and one component of them.
+    vectors_n_per_a: Vec<[f64; 3]>,
+    row_n_per_a: Vec<f64>,
+    /// Currents of least power.
+    plain_a: Vec<f64>,
 }
 
 /// What three rows need beside the upward one.
@@ -45,7 +65,7 @@ pub struct Step {
     pub sideways: Option<SidewaysStep>,
     /// That pull, N.
     pub passive_n: f64,
-    /// How the currents were chosen; `None` outside the map.
+    /// How the currents were chosen; `None` outside the map and where they were chosen for the uncertainties.
     pub allocation: Option<Chosen>,
 }
 
@@ -77,6 +97,9 @@ pub enum RendererError {
     /// Limits or resistances that no array has.
     #[error("{0}")]
     Circuit(#[from] crate::lambda::AllocatorError),
+    /// It was made without uncertainties.
+    #[error("holds no setting for uncertainties: it was made without any")]
+    NoUncertainty,
     /// Points that do not fit their grid.
     #[error("points.csv does not fit its grid")]
     Points,
@@ -127,7 +150,32 @@ impl Renderer {
             force_n_per_a: vec![0.0; allocator.coils()],
             allocator,
             lambda_n_per_m,
+            robust: None,
         })
+    }
+
+    /// As [`Renderer::new`], with the currents of the least expected error under the uncertainties that the
+    /// bundle was made with.
+    ///
+    /// # Errors
+    /// See [`RendererError`].
+    pub fn robust(bundle: &Bundle) -> Result<Self, RendererError> {
+        let mut renderer = Self::new(bundle)?;
+        let runtime = &bundle.map.runtime;
+        let setting = runtime.rendering.as_ref().and_then(|r| r.robust);
+        let setting = setting.ok_or(RendererError::NoUncertainty)?;
+        let coils = renderer.coils();
+        renderer.robust = Some(RobustPart {
+            form: RobustForm::new(setting, coils),
+            resistance_ohm: runtime.resistance_ohm.clone(),
+            lower_a: runtime.current_min_a.clone(),
+            upper_a: runtime.current_max_a.clone(),
+            total_max_a: runtime.total_current_max_a,
+            vectors_n_per_a: vec![[0.0; 3]; coils],
+            row_n_per_a: vec![0.0; coils],
+            plain_a: vec![0.0; coils],
+        });
+        Ok(renderer)
     }
 
     /// Number of coils.
@@ -160,9 +208,19 @@ impl Renderer {
     /// # Panics
     /// When `currents_a` is shorter than the array.
     pub fn step(&mut self, position_m: [f64; 3], currents_a: &mut [f64]) -> Step {
-        if self.vector.is_some() {
-            return self.vector_step(position_m, currents_a);
+        let mut step = if self.vector.is_some() {
+            self.vector_step(position_m, currents_a)
+        } else {
+            self.upward_step(position_m, currents_a)
+        };
+        if step.answer != Answer::Outside {
+            self.choose_for_uncertainties(position_m, &mut step, currents_a);
         }
+        step
+    }
+
+    /// A step for the upward force alone.
+    fn upward_step(&mut self, position_m: [f64; 3], currents_a: &mut [f64]) -> Step {
         let Some(passive_n) = self.map.at(position_m, &mut self.force_n_per_a) else {
             return self.outside(currents_a);
         };
@@ -216,6 +274,84 @@ impl Renderer {
             passive_n,
             allocation: Some(Chosen::Vector(found)),
         }
+    }
+
+    /// Goes on from the currents of least power to those of the least expected error, where that is requested.
+    fn choose_for_uncertainties(
+        &mut self,
+        position_m: [f64; 3],
+        step: &mut Step,
+        currents_a: &mut [f64],
+    ) {
+        let Some(part) = &mut self.robust else { return };
+        let currents = &mut currents_a[..part.plain_a.len()];
+        part.plain_a.copy_from_slice(currents);
+        let wanted = step.sideways.map_or([0.0; 2], |sideways| sideways.wanted_n);
+        let wanted = [wanted[0], wanted[1], step.wanted_n];
+        let axes = if step.sideways.is_some() { 0..3 } else { 2..3 };
+        part.form.clear();
+        let setting = *part.form.setting();
+        for (place, weight) in setting.places_m(position_m, self.map.ends_m()) {
+            let pull_n = if step.sideways.is_some() {
+                self.map.vectors_at(place, &mut part.vectors_n_per_a)
+            } else {
+                self.map.at(place, &mut part.row_n_per_a)
+            };
+            for axis in axes.clone() {
+                if step.sideways.is_some() {
+                    let vectors = part.row_n_per_a.iter_mut().zip(&part.vectors_n_per_a);
+                    vectors.for_each(|(row, vector)| *row = vector[axis]);
+                }
+                let pull_n = if axis == 2 {
+                    pull_n.unwrap_or(0.0)
+                } else {
+                    0.0
+                };
+                part.form
+                    .add(&part.row_n_per_a, wanted[axis] - pull_n, weight);
+            }
+        }
+        let limits = ForceProblem {
+            forces_n_per_a: &[],
+            height_m: &[],
+            offset_n: None,
+            weights: None,
+            lower_a: &part.lower_a,
+            upper_a: &part.upper_a,
+            total_max_a: part.total_max_a,
+            resistance_ohm: &part.resistance_ohm,
+        };
+        part.form.minimise(&limits, currents);
+        let given = |force: &dyn Fn(usize) -> f64| -> f64 {
+            let terms = currents.iter().enumerate();
+            terms.map(|(coil, current)| force(coil) * current).sum()
+        };
+        step.force_n = step.passive_n + given(&|coil| self.force_n_per_a[coil]);
+        if let (Some(sideways), Some(vector)) = (&mut step.sideways, &self.vector) {
+            sideways.force_n = [0, 1].map(|axis| given(&|coil| vector.force_n_per_a[coil][axis]));
+        }
+        step.allocation = None;
+    }
+
+    /// The setting of the uncertainties, where currents are chosen for them.
+    #[must_use]
+    pub fn setting(&self) -> Option<&RobustRuntime> {
+        self.robust.as_ref().map(|part| part.form.setting())
+    }
+
+    /// The currents of least power of the last step inside the map, A, where others were chosen for the
+    /// uncertainties.
+    #[must_use]
+    pub fn plain_a(&self) -> &[f64] {
+        self.robust.as_ref().map_or(&[], |part| &part.plain_a)
+    }
+
+    /// The expected square of the force's error with these currents at the last step inside the map, N^2, where
+    /// they are chosen for the uncertainties.
+    #[must_use]
+    pub fn expected_n2(&self, currents_a: &[f64]) -> Option<f64> {
+        let part = self.robust.as_ref()?;
+        Some(part.form.expected_n2(currents_a))
     }
 
     fn outside(&self, currents_a: &mut [f64]) -> Step {

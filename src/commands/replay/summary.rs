@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Opened;
+use super::felt::FeltSummary;
 use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
@@ -90,6 +91,9 @@ pub struct ForceSummary {
     /// All three components with feedback; absent where the upward one alone is requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vector: Option<VectorErrors>,
+    /// Under the uncertainties that the bundle was made with; absent where currents are not chosen for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub felt: Option<FeltSummary>,
 }
 
 /// Differences from the requested force vector, over the positions inside the map.
@@ -219,7 +223,13 @@ impl Bounds {
         self.certificate = self.certificate.max(certificate);
     }
 
-    fn stages(&self, bundle: &Bundle, dynamics: bool) -> BTreeMap<&'static str, StageAccuracy> {
+    /// Currents chosen for uncertainties (`robust`) are not those of eq. 8, whose conditions are looked at.
+    fn stages(
+        &self,
+        bundle: &Bundle,
+        dynamics: bool,
+        robust: bool,
+    ) -> BTreeMap<&'static str, StageAccuracy> {
         let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
             estimate,
             relative_to: relative_to.to_owned(),
@@ -244,6 +254,9 @@ impl Bounds {
                 ),
             ),
         ]);
+        if robust {
+            stages.remove("allocation");
+        }
         let inductances = bundle.manifest.accuracy.get("inductances");
         if let (true, Some(inductances)) = (dynamics, inductances) {
             stages.insert("inductances", inductances.clone());
@@ -262,6 +275,7 @@ impl ReplaySummary {
         warnings: Vec<String>,
     ) -> Self {
         let bundle = &opened.bundle;
+        let robust = opened.renderer.setting().is_some();
         let trajectory = Trajectory {
             t_s: rows.t_s.clone(),
             position_m: rows.position_m.clone(),
@@ -285,7 +299,7 @@ impl ReplaySummary {
             inputs: std::iter::once(opened.input.clone())
                 .chain(source.input)
                 .collect(),
-            made_with: made_with(source.synthesis.as_ref(), dynamics.is_some()),
+            made_with: made_with(source.synthesis.as_ref(), dynamics.is_some(), robust),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectorySummary {
                 source: source.source,
@@ -303,6 +317,7 @@ impl ReplaySummary {
                 fixed: errors(rows, |row| rows.static_error_n(row)),
                 vector: (bundle.manifest.force.as_ref())
                     .and_then(|force| vector_errors(rows, force.direction)),
+                felt: None,
             },
             currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
@@ -318,7 +333,7 @@ impl ReplaySummary {
             },
             saturated_time_fraction: times.part(rows, Answer::Saturated),
             outside_time_fraction: times.part(rows, Answer::Outside),
-            accuracy: bounds.stages(bundle, dynamics.is_some()),
+            accuracy: bounds.stages(bundle, dynamics.is_some(), robust),
             dynamics,
             warnings,
             files: Vec::new(),

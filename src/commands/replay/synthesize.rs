@@ -175,10 +175,12 @@ impl<'a> Surface<'a> {
 
 /// The options of `replay` as its record states them.
 #[must_use]
-pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
+pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool, robust: bool) -> Options {
     #[derive(Serialize)]
     struct Recorded {
         dynamics: bool,
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        robust: bool,
         synthesize: Option<&'static str>,
         seed: Option<u64>,
         duration_s: Option<f64>,
@@ -195,6 +197,7 @@ pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
     });
     Options::of(&Recorded {
         dynamics,
+        robust,
         synthesize: made_up.map(|(kind, ..)| kind),
         seed: made_up.map(|(_, seed, ..)| seed),
         duration_s: made_up.map(|(_, _, duration_s, _)| duration_s),

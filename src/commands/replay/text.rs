@@ -1,6 +1,7 @@
 //! The result of `replay` for people.
 
 use super::ReplayReport;
+use super::felt::FeltErrors;
 use super::summary::{ErrorSummary, ReplaySummary, VectorErrors};
 use crate::cli::layout::Sheet;
 use crate::cli::quantity::{count, error, force, number, number_to, percent, si};
@@ -40,6 +41,25 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
                 number_to(vector.direction_95_deg, 3),
                 newton(vector.rms_error_n),
                 newton(vector.worst_error_n)
+            ),
+        );
+    }
+    if let Some(felt) = &summary.force.felt {
+        let of = |errors: &FeltErrors| {
+            format!(
+                "{} promised, {} of {}, {} W",
+                percent(errors.promised),
+                percent(errors.realised),
+                count(felt.draws, "random display"),
+                number_to(errors.mean_power_w, 3)
+            )
+        };
+        sheet.line(
+            "felt error",
+            &format!(
+                "chosen for the uncertainties {}\nof least power {}",
+                of(&felt.robust),
+                of(&felt.feedback)
             ),
         );
     }

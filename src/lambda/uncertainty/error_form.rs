@@ -36,6 +36,13 @@ impl ErrorForm {
         }
     }
 
+    /// No error at all.
+    pub(crate) fn clear(&mut self) {
+        self.hessian.fill(0.0);
+        self.linear.fill(0.0);
+        self.constant = 0.0;
+    }
+
     /// Adds `square` times the mean square of `row . I`, each current being off by a share of which
     /// `driver_square` is the mean square.
     pub(crate) fn add_square(&mut self, row: &[f64], square: f64, driver_square: f64) {

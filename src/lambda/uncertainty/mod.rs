@@ -19,10 +19,12 @@
 
 mod draws;
 mod error_form;
+mod runtime;
 mod study;
 
 pub use draws::{Draw, draws};
 pub use error_form::ErrorForm;
+pub use runtime::{RobustForm, RobustRuntime};
 pub use study::{
     CauseCost, CurrentsError, Drawn, FeltError, RobustSetting, Shares, Study, StudyError,
     Surroundings, TradeOff, study,

@@ -39,6 +39,7 @@ ARRAYS = (
 )
 OPTIONAL_ARRAYS = (
     "schema_version", "gx_t_per_m_per_a", "gy_t_per_m_per_a", "requested_direction", "sideways_weight",
+    "robust_setting",
     "gradient_t_per_m_per_a", "field_t_per_a", "passive_force_n",
     "working_point_gz_t_per_m", "total_current_max_a", "lambda_n_per_m", "height_x_m",
     "height_y_m", "height_m", "has_height", "static_current_a", "inductance_h", "voltage_v",
@@ -114,6 +115,7 @@ class Bundle:
             ("gy_t_per_m_per_a", grid),
             ("requested_direction", self._surface() + (3,)),
             ("sideways_weight", ()),
+            ("robust_setting", (5,)),
             ("gradient_t_per_m_per_a", grid + (3, 3)),
             ("field_t_per_a", grid + (3,)),
             ("passive_force_n", grid[1:]),
@@ -166,6 +168,9 @@ class Bundle:
                 raise BundleError("map.npz: array gx_t_per_m_per_a is missing")
             if not 1e-6 <= float(self.map["sideways_weight"]) <= 1:
                 raise BundleError("map.npz: sideways_weight must lie between 1e-6 and 1")
+        setting = self.map.get("robust_setting", np.ones(5))
+        if np.any(setting < 0) or setting[0] == 0:
+            raise BundleError("map.npz: robust_setting must hold a price above 0 and nothing below 0")
 
     def _surface(self):
         return tuple(len(self.map.get(key, ())) for key in ("height_y_m", "height_x_m"))
@@ -265,8 +270,9 @@ class Bundle:
         direction = self.map["requested_direction"]
         return height, np.stack([between(direction[..., k]) for k in range(3)], axis=1)
 
-    def currents(self, points_m):
-        """Currents [A] of least power whose force is lambda times the height (eq. 8), or the nearest.
+    def currents(self, points_m, robust=False):
+        """Currents [A] of least power whose force is lambda times the height (eq. 8), or the nearest; where
+        `robust`, those of the least expected error under the uncertainties that the bundle was made with.
 
         Returns one row a point of currents, one column a coil, the force they give [N], and the
         answers: "ok", "saturated" or "outside" (of the map: no currents). Of bundles that request a
@@ -274,6 +280,8 @@ class Bundle:
         """
         if self.lambda_n_per_m is None:
             raise BundleError("the bundle has no force constant: nothing can be rendered")
+        if robust:
+            return self._robust_currents(points_m)
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
         inside = self.inside(points_m)
         if "requested_direction" in self.map:
@@ -301,6 +309,37 @@ class Bundle:
             answers[k] = "ok" if reached else "saturated"
         force = np.einsum("pck,pc->pk", per_ampere, currents) + pull
         force[~inside] = 0.0
+        return currents, force, answers
+
+    def _robust_currents(self, points_m):
+        """As `currents`, of the least expected error; the answers are those of exact positions."""
+        if "robust_setting" not in self.map:
+            raise BundleError("map.npz holds no robust_setting: the bundle was made without uncertainties")
+        try:
+            from .expected_error import ExpectedError, places
+        except ImportError:
+            from expected_error import ExpectedError, places
+        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        currents, force, answers = self.currents(points_m)
+        vector = "requested_direction" in self.map
+        per_ampere = self.force_vectors_per_ampere if vector else self.force_per_ampere
+        wanted = self.requested_force(points_m)
+        setting = self.map["robust_setting"]
+        nodes = [self.map[key] for key in ("x_m", "y_m", "z_m")]
+        ends = np.array([[axis[0] for axis in nodes], [axis[-1] for axis in nodes]])
+        total = float(self.map.get("total_current_max_a", np.inf))
+        for k in np.flatnonzero(self.inside(points_m)):
+            near, weights = places(points_m[k], setting[1], ends)
+            rows = np.moveaxis(per_ampere(near).reshape(len(near), self.coil_count, -1), 1, 2)
+            left = np.repeat(wanted[k : k + 1, 0 if vector else 2 :], len(near), axis=0)
+            left[:, -1] -= self.passive_force(near)
+            form = ExpectedError(
+                rows, left, weights, setting, self.map["resistance_ohm"], self.map["current_min_a"],
+                self.map["current_max_a"],
+            )
+            currents[k] = form.least(total, currents[k])
+            given = currents[k] @ per_ampere(points_m[k])[0]
+            force[k] = given + self.passive_force(points_m[k])[0] * np.array([0, 0, 1] if vector else 1)
         return currents, force, answers
 
     def allocate_vector(self, force_per_ampere, wanted_n):
