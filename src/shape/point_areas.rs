@@ -126,7 +126,11 @@ impl FineCells {
         });
         shares.keep_all(&mut areas);
         let total: f64 = areas.iter().sum();
-        let is_even = |k: usize| (k % (FINER + 1) | k / (FINER + 1)) & 1 == 0;
+        let is_even = |k: usize| {
+            [k % (FINER + 1), k / (FINER + 1)]
+                .iter()
+                .all(|at| at.is_multiple_of(2))
+        };
         let of_even: f64 = (0..areas.len())
             .filter(|k| is_even(*k))
             .map(|k| areas[k])
