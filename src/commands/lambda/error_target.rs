@@ -30,6 +30,9 @@ const ORDERS: std::ops::RangeInclusive<f64> = 0.7..=2.0;
 /// A grid that uses less of its share is wasteful, unless one a little coarser fails.
 const WASTE: f64 = 0.5;
 const CLOSE: f64 = 1.25;
+/// Between one that fails and one that holds with so many times the intervals another is tried: where a
+/// surface ends or breaks, the error falls irregularly.
+const WIDE: f64 = 2.0;
 /// A little more than the law says, so that the next attempt holds.
 const SPARE: f64 = 1.08;
 /// Other errors for which a run is estimated, against this one's.
@@ -211,7 +214,8 @@ impl Search {
             // Between what fails and what holds, unless that holds closely.
             (Some((few, _)), Some((many, excess))) => {
                 self.intervals = (few * many).sqrt().round();
-                excess < WASTE && many > CLOSE * few && self.intervals < many
+                let wasteful = excess < WASTE || many > WIDE * few;
+                wasteful && many > CLOSE * few && self.intervals < many
             }
             (Some((few, excess)), None) => {
                 let finer = SPARE * excess.powf(1.0 / self.order);

@@ -50,8 +50,9 @@ pub struct Replay {
     /// Folder of a bundle, with its manifest.json
     #[arg(value_name = "BUNDLE")]
     bundle: PathBuf,
-    /// CSV table with the columns t_s, x_m, y_m, z_m of the magnet's centre, in seconds and metres;
-    /// `-` for standard input
+    /// CSV table with the columns t_s, x_m, y_m, z_m of the magnet's centre; `-` for standard input
+    ///
+    /// In seconds and metres.
     #[arg(value_name = "TRAJECTORY", conflicts_with = "synthesize")]
     trajectory: Option<FileArgument>,
     /// Make a trajectory up instead
@@ -75,19 +76,24 @@ pub struct Replay {
     /// Write the trajectory made up to this file too
     #[arg(long, value_name = "FILE", conflicts_with = "trajectory")]
     trajectory_out: Option<PathBuf>,
-    /// Let every current follow its command through the coils' resistances and inductances, under
-    /// the supply's voltage
+    /// Let every current lag behind its command
+    ///
+    /// As the coils' resistances and inductances and the supply's voltage make it.
     #[arg(long)]
     dynamics: bool,
-    /// Command the currents of the least expected error under the uncertainties that the bundle was made with,
-    /// and state the felt error with and without them
+    /// Command currents chosen for the bundle's uncertainties
+    ///
+    /// Those of the least expected error under the uncertainties that the bundle was made with; the
+    /// felt error is stated with and without them.
     #[arg(long)]
     robust: bool,
     /// Draw finger, forces and currents over time to this file (.svg, .png or .pdf)
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
-    /// Where the table goes, with its facts and seconds beside it (replay.json,
-    /// timing_replay.json); `-` is standard output, and then there is nothing beside it
+    /// Where the table goes; `-` is standard output
+    ///
+    /// Its facts and seconds go beside it (replay.json, timing_replay.json); with `-` they are not
+    /// written.
     #[arg(long, value_name = "FILE", default_value = "replay.csv")]
     out: FileArgument,
     #[command(flatten)]
