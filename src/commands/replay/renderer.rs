@@ -465,11 +465,12 @@ impl Renderer {
         let first_axis = if of_vector { 0 } else { 2 };
         let mut rows = Vec::with_capacity(6);
         for (finger, step) in steps.iter().enumerate().filter(|(at, _)| inside[*at]) {
-            let requested = step.wanted_force_n();
-            for axis in first_axis..3 {
-                let row = part.axes_n_per_a[finger][axis].as_slice();
-                rows.push((row, requested[axis] - step.without_currents_n[axis]));
-            }
+            let requested_n = step.wanted_force_n().into_iter();
+            let of_currents = requested_n
+                .zip(step.without_currents_n)
+                .map(|(all, n)| all - n);
+            let axes = part.axes_n_per_a[finger].iter().map(Vec::as_slice);
+            rows.extend(axes.zip(of_currents).skip(first_axis));
         }
         allocate(&part.limits.problem(), &rows, currents);
         let given = self.pair_given_n(&steps, currents);
