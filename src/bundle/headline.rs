@@ -301,6 +301,9 @@ pub struct Headline {
 /// An error that was requested, and what was chosen for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RequestedError {
+    /// Whether nobody requested it and the default holds.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub by_default: bool,
     /// `--error`, relative.
     pub error: f64,
     /// Whether the budget holds it.

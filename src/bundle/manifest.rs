@@ -93,6 +93,9 @@ pub struct MadeWith {
     /// `--refine`; absent without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub refine: bool,
+    /// The error that holds where none was requested and the shape leaves its points to the program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub default_error: Option<f64>,
     /// `--weights`; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Weights>,

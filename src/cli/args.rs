@@ -99,7 +99,8 @@ pub struct ErrorFlags {
     ///
     /// What the computation may add to the force, relative to the requested force, and to lambda:
     /// points, nodes and tolerances are chosen for it, points count by area; grids that documents or
-    /// flags give are obeyed, and what they cause is reported.
+    /// flags give are obeyed, and what they cause is reported. `lambda` and `calibrate` take 1 % for a shape
+    /// whose points nobody gives.
     #[arg(long, value_name = "PART", value_parser = values::error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// With --error: choose the samples also where documents give them; extents stay
@@ -112,7 +113,11 @@ impl ErrorFlags {
     #[must_use]
     pub fn target(self) -> Option<ErrorTarget> {
         let refine = self.refine;
-        self.error.map(|error| ErrorTarget { error, refine })
+        self.error.map(|error| ErrorTarget {
+            error,
+            refine,
+            by_default: false,
+        })
     }
 }
 

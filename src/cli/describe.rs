@@ -312,8 +312,13 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
         format!("{} points{nodes}", grid(&points))
     };
     let holds = if requested.met { "holds" } else { "exceeds" };
+    let kind = if requested.by_default {
+        "default"
+    } else {
+        "requested"
+    };
     let mut lines = vec![format!(
-        "{} {holds} the requested {}: {}, tolerance {}",
+        "{} {holds} the {kind} {}: {}, tolerance {}",
         share(headline.force_error),
         share(requested.error),
         chosen(requested.points, requested.nodes),

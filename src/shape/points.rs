@@ -217,7 +217,7 @@ pub fn discretize_with(
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
     let (surface, warnings) = Surface::open(document, progress)?;
-    discretize_surface(document, (surface, warnings), settings, progress)
+    discretize_surface(document, (&surface, warnings), settings, progress)
 }
 
 /// As [`discretize_with`], for a surface that was opened before, with its warnings.
@@ -228,7 +228,7 @@ pub fn discretize_with(
 /// Long because every step uses what the steps before it made.
 pub fn discretize_surface(
     document: &ShapeDocument,
-    (surface, mut warnings): (Surface, Vec<String>),
+    (surface, mut warnings): (&Surface, Vec<String>),
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
@@ -264,11 +264,11 @@ pub fn discretize_surface(
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
     if settings.marks {
-        let probe = Probe::new(&surface, &points.grid);
+        let probe = Probe::new(surface, &points.grid);
         mark(&mut points, &probe, &found, progress)?;
         (points.area_m2, points.fine) = point_areas_m2(&points, &probe, progress)?;
     }
-    let hidden = settings.marks.then(|| Hidden::of(&surface)).flatten();
+    let hidden = settings.marks.then(|| Hidden::of(surface)).flatten();
     if let Some(share) = hidden
         .map(|hidden| hidden.of_upward)
         .filter(|s| *s > MOST_HIDDEN)
@@ -289,7 +289,7 @@ pub fn discretize_surface(
     }
     let certificate = match &settings.known {
         Some(known) if how != Certify::No => Some(known.clone()),
-        _ => certify(&surface, &grid, &samples, how, seconds, progress)?,
+        _ => certify(surface, &grid, &samples, how, seconds, progress)?,
     };
     if how != Certify::No && certificate.is_none() {
         warnings.push(
@@ -300,15 +300,15 @@ pub fn discretize_surface(
         );
     }
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
-        by_cell(&surface, &grid, &samples, seconds, progress)?
+        by_cell(surface, &grid, &samples, seconds, progress)?
     } else {
         None
     };
-    let read_by = match &surface {
+    let read_by = match surface {
         Surface::Mesh(mesh) => mesh.read_by().map(str::to_owned),
         Surface::Primitive(_) => None,
     };
-    let (mesh, method) = match &surface {
+    let (mesh, method) = match surface {
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
             "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \

@@ -192,3 +192,31 @@ fn map_takes_the_fewest_nodes_that_hold_an_error() {
     let ran = place.run(&["map", SEED, "--error", "0.01%", "--out", "given"]);
     ran.ends(0).says(&["0.01 % is exceeded", "--refine"]);
 }
+
+/// A shape that leaves its points to the program is held to 1 %; one that gives them is computed as it is.
+#[test]
+fn points_that_nobody_gives_hold_the_default_error() {
+    let place = Place::new();
+    let wedge = "primitive = \"wedge\"\nlow_mm = 34.0\n";
+    let free = shape(&place, "wedge", wedge);
+    let run = ["lambda", SEED, &free, "--format", "json"];
+    let run = place.run(&run).ends(0).json();
+    let requested = &run["headline"]["requested"];
+    assert_eq!(
+        (&requested["by_default"], &requested["met"]),
+        (&Value::Bool(true), &Value::Bool(true))
+    );
+    assert!(number(&run["headline"]["force_error"]) <= number(&requested["error"]));
+    assert_eq!(run["weights"], "area");
+    let grid = "[points]\nx_mm = [-50.0, 50.0, 7]\ny_mm = [-50.0, 50.0, 7]\n";
+    let given = shape(&place, "given", &format!("{wedge}{grid}"));
+    let run = ["lambda", SEED, &given, "--format", "json"];
+    let run = place.run(&run).ends(0).json();
+    assert_eq!(run["points"], 49);
+    assert!(run["headline"].get("requested").is_none_or(Value::is_null));
+    place.run(&["calibrate", SEED, &free, "-q"]).ends(0);
+    let manifest: Value =
+        serde_json::from_slice(&place.read("results/seed_air/wedge/manifest.json")).unwrap();
+    assert_eq!(manifest["made_with"]["default_error"], 0.01);
+    place.run(&["verify", "results/seed_air/wedge"]).ends(0);
+}

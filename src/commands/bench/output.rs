@@ -62,6 +62,8 @@ pub fn made_with(request: &BenchRequest) -> Options {
         force: _,
         direction_jnd_deg: _,
         uncertainty: _,
+        // A scene's grids are measured as they are.
+        default_error: _,
     } = lambda;
     let Settings {
         criterion,

@@ -45,6 +45,7 @@ pub fn expected(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Expected, RunError> {
+    let options = &options.for_shape(shape);
     let scene = &scene.to_tolerance(options.lambda.tolerance_for(scene.design));
     let table = curve.map(|(_, text)| text.as_str());
     let field = FieldStore::new(scene, table, Store::none());

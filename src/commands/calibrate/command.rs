@@ -28,6 +28,7 @@ use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
 use crate::design::Need;
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
+use crate::scene::tolerances::ErrorTarget;
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
 ///
@@ -105,6 +106,7 @@ impl Calibrate {
             uncertainty: self.uncertain.into(),
             weights: self.weights.weights,
             error: self.error.target(),
+            default_error: Some(ErrorTarget::DEFAULT),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(

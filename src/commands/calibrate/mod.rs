@@ -113,6 +113,14 @@ impl CalibrateOptions {
             .any(|shape| force(shape).direction.is_vector())
     }
 
+    /// These options with the error that holds for `shape`.
+    pub(crate) fn for_shape(&self, shape: &ShapeSource) -> Self {
+        Self {
+            lambda: self.lambda.for_document(&shape.document),
+            ..self.clone()
+        }
+    }
+
     /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
@@ -129,6 +137,7 @@ impl CalibrateOptions {
             tolerance,
             weights,
             error,
+            default_error,
             // Of `lambda` alone.
             sampling: _,
             wiring: _,
@@ -145,6 +154,8 @@ impl CalibrateOptions {
             jnd_weight,
             at_n_per_m,
         } = *settings;
+        let requested = error.filter(|target| !target.by_default);
+        let free = requested.is_none() && !shape.document.grid_is_given;
         let mut made_with = MadeWith {
             criterion: Some(criterion),
             jnd: Some(jnd_weight),
@@ -154,8 +165,9 @@ impl CalibrateOptions {
             normal_force: force.normal_force,
             weights: *weights,
             uncertainty: *uncertainty,
-            error: error.map(|target| target.error),
-            refine: error.is_some_and(|target| target.refine),
+            error: requested.map(|target| target.error),
+            refine: requested.is_some_and(|target| target.refine),
+            default_error: default_error.filter(|_| free),
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -246,6 +258,7 @@ pub fn run(
         .iter()
         .zip(&checked)
         .map(|(shape, checked)| {
+            let options = &options.for_shape(shape);
             Calibration {
                 scene: &scene,
                 solved: &solved,

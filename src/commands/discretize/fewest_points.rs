@@ -2,12 +2,15 @@
 
 use crate::RunError;
 use crate::progress::Progress;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{AxisRequest, ShapeDocument};
 
 /// Samples along the longer side of the first grid.
 const FIRST: usize = 17;
 /// Samples along either side, at most: beyond, tables and files are of no use to a runtime.
 const MOST: usize = 769;
+/// The same where nobody requested an error.
+const MOST_BY_DEFAULT: usize = 193;
 /// Attempts at most.
 const ATTEMPTS: usize = 8;
 /// How much finer a grid becomes from one attempt to the next.
@@ -32,16 +35,22 @@ const SPARE: f64 = 1.08;
 /// Those of `excess`; interruption.
 pub(crate) fn fewest_points(
     document: &ShapeDocument,
+    target: ErrorTarget,
     progress: &dyn Progress,
     mut excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
 ) -> Result<(ShapeDocument, f64), RunError> {
+    let most = if target.by_default {
+        MOST_BY_DEFAULT
+    } else {
+        MOST
+    };
     let of_document = [document.grid.x, document.grid.y].map(AxisRequest::samples);
     let longest = of_document[0].max(of_document[1]).saturating_sub(1).max(1);
     let sampled = |intervals: f64| {
         let factor = intervals / longest as f64;
         document.with_samples(of_document.map(|samples| match samples {
             1 => 1,
-            more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(5, MOST),
+            more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(5, most),
         }))
     };
     let mut search = Search::new((FIRST - 1) as f64);
@@ -51,7 +60,7 @@ pub(crate) fn fewest_points(
         let Some(excess) = excess(&tried)? else {
             return Ok((tried, search.order));
         };
-        if !search.tried(excess, (MOST - 1) as f64) {
+        if !search.tried(excess, (most - 1) as f64) {
             break;
         }
     }

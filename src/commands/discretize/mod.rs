@@ -284,20 +284,19 @@ pub fn run_with(
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
     let made_with = options.made_with(document, inputs.first());
+    let opened = OpenedSurface::new(document, inputs, progress)?;
     let mut document = Cow::Borrowed(document);
     let chosen = options
         .error
         .filter(|target| target.refine || !document.grid_is_given);
     if let Some(target) = chosen {
-        let (fewest, _) = fewest_points(&document, progress, |tried| {
-            let opened = OpenedSurface::new(tried, inputs.clone(), progress)?;
+        let (fewest, _) = fewest_points(&document, target, progress, |tried| {
             let report = opened.discretize(tried, options, None, progress)?;
             let between = between_points(&report).0;
             Ok(between.map(|part| part.error / target.error))
         })?;
         document = Cow::Owned(fewest);
     }
-    let opened = OpenedSurface::new(&document, inputs, progress)?;
     let mut report = opened.discretize(&document, options, None, progress)?;
     report.summary.made_with = made_with;
     if let Some(target) = options.error {
@@ -380,7 +379,7 @@ impl OpenedSurface {
     ///
     /// # Errors
     /// A file without a surface.
-    fn new(
+    pub(crate) fn new(
         document: &ShapeDocument,
         mut inputs: Vec<Input>,
         progress: &dyn Progress,
@@ -398,8 +397,12 @@ impl OpenedSurface {
         })
     }
 
-    fn discretize(
-        self,
+    /// The points of `document`, whose grid alone may differ from that of the document that was opened.
+    ///
+    /// # Errors
+    /// As [`run_with`].
+    pub(crate) fn discretize(
+        &self,
         document: &ShapeDocument,
         options: &PointsOptions,
         known: Option<Certificate>,
@@ -413,10 +416,10 @@ impl OpenedSurface {
             marks: true,
             cells: options.picture,
         };
-        let surface = (self.surface, self.warnings);
+        let surface = (&self.surface, self.warnings.clone());
         let discretized = discretize_surface(document, surface, &settings, progress)
             .map_err(|source| shape_error(document, source))?;
-        let mut report = report(document, self.inputs, discretized);
+        let mut report = report(document, self.inputs.clone(), discretized);
         if let Some(weights) = options.weights {
             report.weights = Some(weights);
             report.summary.weights = weights;

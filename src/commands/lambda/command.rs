@@ -23,6 +23,7 @@ use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
 use crate::lambda::{Criterion, Settings, Wiring};
+use crate::scene::tolerances::ErrorTarget;
 
 /// The largest force constant of one object, and its currents
 ///
@@ -171,6 +172,7 @@ impl Lambda {
         let options = LambdaOptions {
             weights: self.weights.weights,
             error: self.error.target(),
+            default_error: Some(ErrorTarget::DEFAULT),
             sampling: self.sampling.sampling(),
             wiring: Wiring {
                 broken: self.wiring.broken.clone(),

@@ -7,9 +7,9 @@ use super::LambdaReport;
 use super::points::{ForcesAt, WantedPoints};
 use crate::RunError;
 use crate::bundle::headline::{RequestedError, RunAtError};
-use crate::commands::discretize;
 use crate::commands::discretize::between_points::between_points;
 use crate::commands::discretize::fewest_points::{SMOOTH, fewest_points};
+use crate::commands::discretize::{OpenedSurface, PointsOptions};
 use crate::design::Workspace;
 use crate::lambda::{ForceProblem, constant};
 use crate::progress::Progress;
@@ -65,8 +65,9 @@ impl Trial<'_> {
         if chosen.fixed {
             return Ok(chosen);
         }
-        let fewest = fewest_points(document, progress, |document| {
-            self.excess(document, target, progress)
+        let opened = OpenedSurface::new(document, Vec::new(), progress)?;
+        let fewest = fewest_points(document, target, progress, |document| {
+            self.excess(&opened, document, target, progress)
         })?;
         (chosen.document, chosen.order) = fewest;
         Ok(chosen)
@@ -76,12 +77,13 @@ impl Trial<'_> {
     /// rendered.
     fn excess(
         &self,
+        opened: &OpenedSurface,
         document: &ShapeDocument,
         target: ErrorTarget,
         progress: &dyn Progress,
     ) -> Result<Option<f64>, RunError> {
         let (scene, options) = (self.scene, self.options);
-        let report = discretize::run(document, Vec::new(), progress)?;
+        let report = opened.discretize(document, &PointsOptions::default(), None, progress)?;
         let points = WantedPoints::of_grid(&report, options.weights_of(&report));
         let positions = &points.positions_m;
         let forces_n_per_a =
@@ -198,6 +200,7 @@ impl LambdaReport {
             )
         });
         headline.requested = Some(RequestedError {
+            by_default: target.by_default,
             error: target.error,
             met,
             fixed,

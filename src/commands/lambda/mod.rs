@@ -66,6 +66,8 @@ pub struct LambdaOptions {
     pub weights: Option<Weights>,
     /// The largest error that the computation may add.
     pub error: Option<ErrorTarget>,
+    /// The same for a shape that leaves its points to the program, where none is requested.
+    pub default_error: Option<f64>,
     /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
     pub sampling: Option<Sampling>,
     /// Coils broken or in series.
@@ -115,6 +117,22 @@ pub struct LambdaReport {
 }
 
 impl LambdaOptions {
+    /// These options with the error that holds for `document`.
+    #[must_use]
+    pub fn for_document(&self, document: &ShapeDocument) -> Self {
+        let free = !document.grid_is_given && self.sampling.is_none();
+        let default = self.default_error.filter(|_| free);
+        let default = default.map(|error| ErrorTarget {
+            error,
+            refine: false,
+            by_default: true,
+        });
+        Self {
+            error: self.error.or(default),
+            ..self.clone()
+        }
+    }
+
     /// These options, the force being the document's where they request none.
     fn over(&self, document: &ShapeDocument) -> Self {
         Self {
@@ -137,7 +155,9 @@ impl LambdaOptions {
     /// The tolerance of the field: as requested, else what a requested error leaves to steel. Air has
     /// its default, which costs nothing.
     pub(crate) fn tolerance_for(&self, design: &Design) -> Option<f64> {
-        let of_error = self.error.filter(|_| design.core.is_some());
+        let of_error = self
+            .error
+            .filter(|target| design.core.is_some() && !target.by_default);
         self.tolerance.or(of_error.map(ErrorTarget::tolerance))
     }
 }
@@ -180,6 +200,7 @@ pub fn run(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
+    let options = &options.for_document(document);
     let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
     let search = search(&scene, document, options, progress)?;
     let document = search

@@ -152,8 +152,13 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         weights: made_with.and_then(|made| made.weights),
         error: made_with.and_then(|made| {
             let refine = made.refine;
-            made.error.map(|error| ErrorTarget { error, refine })
+            made.error.map(|error| ErrorTarget {
+                error,
+                refine,
+                by_default: false,
+            })
         }),
+        default_error: made_with.and_then(|made| made.default_error),
         ..LambdaOptions::default()
     };
     match made_with {
@@ -182,7 +187,9 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         && options
             .lambda
             .error
-            .is_none_or(|target| ErrorTarget::RANGE.contains(&target.error))
+            .map(|target| target.error)
+            .or(options.lambda.default_error)
+            .is_none_or(|error| ErrorTarget::RANGE.contains(&error))
         && options
             .lambda
             .tolerance

@@ -159,8 +159,12 @@ impl Verifier {
         };
         let made_with = bundle.manifest.made_with.as_ref();
         let of_error = made_with.and_then(|made| made.error).map(|error| {
-            let refine = false;
-            ErrorTarget { error, refine }.tolerance()
+            ErrorTarget {
+                error,
+                refine: false,
+                by_default: false,
+            }
+            .tolerance()
         });
         let tolerance = made_with.and_then(|made| made.tolerance).or(of_error);
         // Solved again as the bundle was made, and to judge that a finer time.
