@@ -60,6 +60,50 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
         .ends(0);
 }
 
+/// Two cored coils: the pattern of opposite currents settles more slowly than a coil alone.
+#[test]
+fn regression_the_settling_limit_held_for_a_coil_alone() {
+    let place = Place::new();
+    let text = place.text("designs/seed.toml");
+    let text = text
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2")
+        .replace("pitch_mm = 50.0", "pitch_mm = 39.0");
+    place.write("two.toml", &text);
+    let mut arguments = vec!["optimize", "two.toml", "--for", FLAT];
+    arguments.extend(["--vary", "coil.length_mm=30:100", "--vary"]);
+    arguments.extend(["coil.inner_diameter_mm=10:30", "--evaluations", "40"]);
+    arguments.extend(["--starts", "1", "--out", "best.toml", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    let best = place
+        .run(&["evaluate", "best.toml", "--strict", "--format", "json"])
+        .ends(0)
+        .json();
+    let henry = |j: usize| best["array"]["mutual_inductance_h"][0][j].as_f64().unwrap();
+    let settled = 5.0 * (henry(0) + henry(1).abs()) / number(&best, "coil/resistance_ohm");
+    assert!((number(&best, "array/settling_s") / settled - 1.0).abs() < 1e-9);
+    assert!(settled < 0.1 && settled > 0.09, "{settled}");
+    assert!((number(&best, "limits/array_settling_s/value") / settled - 1.0).abs() < 1e-9);
+    assert!(number(&best, "coil/settling_s") < settled, "{best}");
+    assert_eq!(result["limits"]["array_settling_s"]["limit"], 0.1);
+}
+
+/// Nothing that is searched lets a coil settle in time: its limit is not asked of the array either.
+#[test]
+fn a_settling_limit_that_the_given_coil_misses_does_not_fail_a_search_of_the_pitch() {
+    let place = Place::new();
+    let text = place.text("designs/seed.toml");
+    let text = text
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    place.write("two.toml", &text);
+    let mut arguments = vec!["optimize", "two.toml", "--for", FLAT];
+    arguments.extend(["--vary", "array.pitch_mm=39:60", "--starts", "1"]);
+    arguments.extend(["--evaluations", "12", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    assert!(result["limits"]["array_settling_s"].is_null());
+}
+
 /// A known answer: the pitch alone against a fine scan.
 #[test]
 fn the_pitch_alone_is_that_of_a_fine_scan() {

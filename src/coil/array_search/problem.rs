@@ -31,7 +31,7 @@ pub struct Physical {
     pub lambda_n_per_m: Vec<f64>,
     /// Self inductance of a coil alone, H.
     pub inductance_h: f64,
-    /// The largest among its neighbours, H.
+    /// That of the array's slowest pattern of currents, H.
     pub array_inductance_h: f64,
     /// Flux density in the core at the rated current, T.
     pub core_field_t: Option<f64>,
