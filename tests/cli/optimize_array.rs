@@ -43,6 +43,17 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     for limit in result["limits"].as_object().unwrap().values() {
         assert_eq!(limit["met"], true, "{limit}");
     }
+    let history = result["history"].as_array().unwrap();
+    let grows = |pair: &[Value]| {
+        number(&pair[0], "gain") < number(&pair[1], "gain")
+            && number(&pair[0], "evaluations") < number(&pair[1], "evaluations")
+    };
+    assert!(!history.is_empty() && history.windows(2).all(grows));
+    let last = number(history.last().unwrap(), "gain");
+    assert!(
+        (last / number(&result, "gain") - 1.0).abs() < 1e-2,
+        "{last}"
+    );
     let best = place
         .run(&["evaluate", "best.toml", "--strict", "--format", "json"])
         .ends(0)
@@ -184,6 +195,20 @@ fn mirrored_shapes_give_mirrored_arrays() {
     let ((one, moves), (other, mirrored)) = (gain("shapes/wedge.toml"), gain("mirrored.toml"));
     assert!((one / other - 1.0).abs() < 2e-3, "{one} {other}");
     assert!(moves.iter().chain(&mirrored).all(|x| x.abs() <= 12.0));
+}
+
+/// The picture states what limits are worth, and is what its ending says.
+#[test]
+fn regression_a_png_of_the_trade_offs_held_svg() {
+    let place = Place::new();
+    let drawn = |file: &str| {
+        place.run(&search(&["--plot", file])).ends(0);
+        place.read(file)
+    };
+    assert!(drawn("front.png").starts_with(b"\x89PNG"));
+    let svg = String::from_utf8(drawn("front.svg")).expect("text");
+    assert!(svg.contains("ohm more of resistance would give"), "{svg}");
+    place.run(&search(&["--plot", "front.jpeg"])).ends(2);
 }
 
 #[test]

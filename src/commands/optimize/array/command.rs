@@ -53,8 +53,8 @@ pub struct ArrayFlags {
     /// Write the trade-offs against mass, heat and settling here (CSV)
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
-    /// Draw them here (SVG, PNG or PDF)
-    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
+    /// Draw them here, with what limits are worth (SVG, PNG or PDF)
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes", value_parser = values::picture)]
     pub plot: Option<FileArgument>,
     /// Keep every array that is computed in this file, and take from it those of an earlier run
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
@@ -172,8 +172,9 @@ impl ArrayFlags {
             &of_table,
             printer,
         )?;
-        let drawn = match (&plot, tables::svg(&result)) {
-            (Some(plot), Some(svg)) => plot.write(&result.inputs, &svg, printer)?,
+        let worths = result.study.as_ref().map_or_else(Vec::new, text::worths);
+        let drawn = match (&plot, tables::drawing(&result, &worths)) {
+            (Some(plot), Some(drawing)) => plot.draw(&result.inputs, &drawing, printer)?,
             _ => Stream::Output,
         };
         if [front, drawn].contains(&Stream::Error) {
