@@ -92,10 +92,11 @@ pub fn read_columns(
     source: impl Read,
     expected: &[&str],
 ) -> Result<Vec<Vec<f64>>, TableError> {
-    read_numbered(name, source, expected).map(|(columns, _)| columns)
+    read_numbered(name, source, expected, &[]).map(|(columns, _)| columns)
 }
 
-/// As [`read_columns`], with the line of every row, for messages about what the numbers mean.
+/// As [`read_columns`], with the line of every row, for messages about what the numbers mean. The columns of
+/// `group` follow where the table has any of them.
 ///
 /// # Errors
 /// As [`read_columns`].
@@ -103,6 +104,7 @@ pub(crate) fn read_numbered(
     name: &str,
     source: impl Read,
     expected: &[&str],
+    group: &[&str],
 ) -> Result<(Vec<Vec<f64>>, Vec<u64>), TableError> {
     let text = whole(name, source)?;
     let separator = separated_by_commas(name, &text, expected);
@@ -117,6 +119,10 @@ pub(crate) fn read_numbered(
         .iter()
         .map(|cell| String::from_utf8_lossy(cell).into_owned())
         .collect();
+    let grouped = group
+        .iter()
+        .any(|name| header.iter().any(|cell| cell == name));
+    let expected = &[expected, if grouped { group } else { &[] }].concat();
     let places = find_columns(name, &header, expected)?;
     let mut columns = vec![Vec::new(); expected.len()];
     let mut lines = Vec::new();
@@ -262,7 +268,7 @@ pub(crate) fn read_rows<R: Clone + Default>(
     source: impl Read,
     columns: &[RowColumn<R>],
 ) -> Result<Vec<R>, TableError> {
-    let (values, lines) = read_numbered(name, source, &names(columns))?;
+    let (values, lines) = read_numbered(name, source, &names(columns), &[])?;
     Ok(rows(columns, &values, lines.len()))
 }
 
@@ -287,7 +293,7 @@ fn rows<R: Clone + Default>(columns: &[RowColumn<R>], values: &[Vec<f64>], count
 /// As [`read_columns`].
 pub(crate) fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
     let columns = CurrentRow::COLUMNS;
-    let (values, lines) = read_numbered(name, source, &names(columns))?;
+    let (values, lines) = read_numbered(name, source, &names(columns), &[])?;
     let mut coils = values[0].iter().enumerate();
     if let Some((row, coil)) = coils.find(|(row, coil)| **coil != *row as f64) {
         let line = lines[row];

@@ -101,7 +101,7 @@ impl Scan {
         wanted.extend(quantities.iter().map(|quantity| quantity.column()));
         wanted.extend(drives.iter().map(|(column, _)| column.clone()));
         let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
-        let (columns, lines) = read_numbered(name, bytes, &wanted)?;
+        let (columns, lines) = read_numbered(name, bytes, &wanted, &[])?;
         let (places, rest) = columns.split_at(3);
         let (measured, driven) = rest.split_at(quantities.len());
         let currents_a = flowing(name, &drives, driven, &lines, coils)?;

@@ -7,14 +7,18 @@ use super::table::{Column, write_columns};
 
 /// Columns of a trajectory.
 pub(crate) const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
+/// Columns of a second finger.
+const SECOND_COLUMNS: [&str; 3] = ["x2_m", "y2_m", "z2_m"];
 
-/// Positions of the magnet's centre over time; times never decrease.
+/// Positions of the magnet's centre over time, of one finger or two; times never decrease.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
     /// Time of each position, s.
     pub t_s: Vec<f64>,
     /// x, y, z, m.
     pub position_m: Vec<[f64; 3]>,
+    /// The same of a second finger; empty without one.
+    pub second_m: Vec<[f64; 3]>,
 }
 
 impl Trajectory {
@@ -28,6 +32,13 @@ impl Trajectory {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
+    }
+
+    /// The positions of every finger, finger by finger.
+    pub fn fingers(&self) -> impl Iterator<Item = &[[f64; 3]]> {
+        let all = [self.position_m.as_slice(), &self.second_m];
+        let count = if self.second_m.is_empty() { 1 } else { 2 };
+        all.into_iter().take(count)
     }
 
     /// The median of the times between positions, s; 0 for a single one.
@@ -48,13 +59,13 @@ impl Trajectory {
         held
     }
 
-    /// Reads a table with the columns `t_s,x_m,y_m,z_m`.
+    /// Reads a table with the columns `t_s,x_m,y_m,z_m`, of two fingers `x2_m,y2_m,z2_m` too.
     ///
     /// # Errors
     /// As [`super::read_table::read_columns`]; no rows; the first time that is smaller than the one
     /// before it; a duration beyond the numbers.
     pub fn read(name: &str, source: impl Read) -> Result<Self, TableError> {
-        let (columns, lines) = read_numbered(name, source, &TRAJECTORY_COLUMNS)?;
+        let (columns, lines) = read_numbered(name, source, &TRAJECTORY_COLUMNS, &SECOND_COLUMNS)?;
         let t_s = &columns[0];
         if t_s.is_empty() {
             let fault = format!("{name}: holds no position; expected a row a measured position");
@@ -74,10 +85,13 @@ impl Trajectory {
                 "{name}: column t_s: from {first} to {last} is no time in seconds"
             )));
         }
+        let finger = |axes: &[Vec<f64>]| match axes {
+            [x, y, z] => (0..t_s.len()).map(|row| [x[row], y[row], z[row]]).collect(),
+            _ => Vec::new(),
+        };
         Ok(Self {
-            position_m: (0..t_s.len())
-                .map(|row| [columns[1][row], columns[2][row], columns[3][row]])
-                .collect(),
+            position_m: finger(&columns[1..4]),
+            second_m: finger(&columns[4..]),
             t_s: t_s.clone(),
         })
     }
@@ -87,11 +101,13 @@ impl Trajectory {
     /// # Errors
     /// The writer's.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let axis = |k: usize| -> Vec<f64> { self.position_m.iter().map(|p| p[k]).collect() };
-        let axes = [axis(0), axis(1), axis(2)];
+        let axes = self.fingers().flat_map(|finger| {
+            (0..3).map(|axis| -> Vec<f64> { finger.iter().map(|p| p[axis]).collect() })
+        });
+        let axes: Vec<_> = axes.collect();
         let values = std::iter::once(&self.t_s).chain(&axes);
-        let columns: Vec<(&str, Column)> = TRAJECTORY_COLUMNS
-            .into_iter()
+        let names = TRAJECTORY_COLUMNS.into_iter().chain(SECOND_COLUMNS);
+        let columns: Vec<(&str, Column)> = names
             .zip(values.map(|values| Column::Number(values)))
             .collect();
         write_columns(out, &columns)
@@ -116,6 +132,11 @@ mod tests {
         let mut written = Vec::new();
         found.write(&mut written).unwrap();
         assert_eq!(read(std::str::from_utf8(&written).unwrap()).unwrap(), found);
+        let two = read("t_s,y2_m,x_m,y_m,z_m,x2_m,z2_m\n0,5,1,2,3,4,6\n").unwrap();
+        assert_eq!(two.second_m, [[4.0, 5.0, 6.0]]);
+        let mut written = Vec::new();
+        two.write(&mut written).unwrap();
+        assert_eq!(read(std::str::from_utf8(&written).unwrap()).unwrap(), two);
         let single = read("t_s,x_m,y_m,z_m\n3,0,0,0.05\n").unwrap();
         assert_eq!((single.median_step_s(), single.held_s()), (0.0, vec![0.0]));
     }
@@ -129,6 +150,10 @@ mod tests {
                 "finger.csv:1: column z_m is missing",
             ),
             ("t_s,x_m,y_m,z_m\n", "holds no position"),
+            (
+                "t_s,x_m,y_m,z_m,x2_m,y2_m\n0,0,0,0,0,0\n",
+                "finger.csv:1: column z2_m is missing",
+            ),
             (
                 "t_s,x_m,y_m,z_m\n0,0,0,0.05\n0.02,nan,0,0.05\n",
                 "finger.csv:3: column x_m: expected a finite number, found \"nan\"",

@@ -250,7 +250,7 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "LENGTH",
         value_parser = values::length_with_unit,
-        conflicts_with = "weights"
+        conflicts_with_all = ["weights", "error"]
     )]
     max_deviation: Option<f64>,
     /// No patch wider than this [default: for `discretize` no limit, for `lambda` a sixteenth of the
@@ -269,7 +269,7 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "SPACING",
         value_parser = values::length_with_unit,
-        conflicts_with_all = ["max_deviation", "weights"]
+        conflicts_with_all = ["max_deviation", "weights", "error"]
     )]
     poisson: Option<f64>,
     /// Which random points

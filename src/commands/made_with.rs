@@ -47,6 +47,10 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
 pub(crate) struct PointsAsked {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<Weights>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refine: bool,
     pub holes: Option<&'static str>,
     pub certify: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]

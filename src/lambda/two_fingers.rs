@@ -20,7 +20,7 @@ use fluxform_numerics::random::Random;
 use fluxform_numerics::vec3::dot;
 
 use super::feedback::FeedbackError;
-use super::problem::Settings;
+use super::problem::{ForceProblem, Settings};
 use super::uncertainty::ErrorForm;
 use super::vector_feedback::VectorProblem;
 
@@ -29,7 +29,7 @@ const PAIRS: usize = 1000;
 /// Pairs tried for each that is looked at, where few points have a partner.
 const TRIALS: usize = 200;
 /// A force counts as given within this share of the larger request.
-const GIVEN: f64 = 1e-3;
+pub const GIVEN: f64 = 1e-3;
 /// Price of power, relative to the forces' square over resistance: below what `GIVEN` sees.
 const PRICE: f64 = 1e-9;
 /// The pairs are the same in every run.
@@ -126,6 +126,24 @@ pub fn two_fingers(
     })
 }
 
+/// Leaves in `currents_a`, whose currents must be within the limits, those of least power that give every
+/// force: each a row of forces per ampere (N/A) and the force requested (N); where the limits forbid that,
+/// those of the least sum of squared errors. That sum's root, N.
+pub fn allocate(limits: &ForceProblem, rows: &[(&[f64], f64)], currents_a: &mut [f64]) -> f64 {
+    let mut form = ErrorForm::new(currents_a.len());
+    let mut strongest = 0.0_f64;
+    for (row, requested_n) in rows {
+        strongest = row.iter().fold(strongest, |most, g| most.max(g.abs()));
+        form.add_square(row, 1.0, 0.0);
+        form.add_target(row, *requested_n, 1.0, 1.0);
+    }
+    let ohm = limits.resistance_ohm.iter().copied();
+    let least_ohm = ohm.fold(f64::INFINITY, f64::min);
+    let price = (PRICE * strongest * strongest / least_ohm).max(f64::MIN_POSITIVE);
+    form.minimise(limits, price, currents_a);
+    form.value(currents_a).sqrt()
+}
+
 fn random_pairs(positions_m: &[[f64; 3]], [least_m, most_m]: [f64; 2]) -> Vec<[usize; 2]> {
     let mut random = Random::new(SEED);
     let points = positions_m.len();
@@ -178,23 +196,15 @@ fn one_pair(
         |of: &dyn Fn(usize) -> f64| (0..3).map(|axis| of(axis).powi(2)).sum::<f64>().sqrt();
     let largest = length(&|axis| request(0, axis)).max(length(&|axis| request(1, axis)));
     let solved = |first_axis: usize| -> (bool, f64) {
-        let mut form = ErrorForm::new(coils);
-        let mut strongest = 0.0_f64;
-        for finger in 0..2 {
-            for axis in first_axis..3 {
-                let row = row(finger, axis);
-                strongest = row.iter().fold(strongest, |most, g| most.max(g.abs()));
-                form.add_square(row, 1.0, 0.0);
-                form.add_target(row, wanted(finger, axis), 1.0, 1.0);
-            }
-        }
+        let fingers = (0..2).flat_map(|finger| (first_axis..3).map(move |axis| (finger, axis)));
+        let rows: Vec<_> = fingers
+            .map(|(finger, axis)| (row(finger, axis), wanted(finger, axis)))
+            .collect();
         let mut currents = vec![0.0; coils];
+        let error_n = allocate(upward, &rows, &mut currents);
         let ohm = upward.resistance_ohm;
-        let least_ohm = ohm.iter().copied().fold(f64::INFINITY, f64::min);
-        let price = (PRICE * strongest * strongest / least_ohm).max(f64::MIN_POSITIVE);
-        form.minimise(upward, price, &mut currents);
         let power = ohm.iter().zip(&currents).map(|(ohm, i)| ohm * i * i).sum();
-        (form.value(&currents).sqrt() <= GIVEN * largest, power)
+        (error_n <= GIVEN * largest, power)
     };
     let [(upward_given, upward_w), (vector_given, vector_w)] = [2, 0].map(solved);
     let magnets_n = length(&|axis| on_second[axis]);

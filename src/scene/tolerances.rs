@@ -51,6 +51,23 @@ impl ErrorTarget {
     /// No steel needs to be solved more coarsely.
     const COARSEST: f64 = 1e-3;
 
+    /// The sentence of a request that is exceeded, by an error that `of` names, and what to do.
+    #[must_use]
+    pub(crate) fn exceeded(self, of: &str, found: f64, advice: &str) -> String {
+        // Three digits, without an exponent.
+        let percent = |part: f64| {
+            let rounded = format!("{:.2e}", 100.0 * part);
+            rounded
+                .parse::<f64>()
+                .map_or(rounded, |value| value.to_string())
+        };
+        format!(
+            "the requested error of {} % is exceeded: {of} {} %{advice}",
+            percent(self.error),
+            percent(found)
+        )
+    }
+
     /// What the number of points may add.
     #[must_use]
     pub fn of_points(self) -> f64 {

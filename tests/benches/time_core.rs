@@ -55,6 +55,7 @@ fn stages(design: &Design) -> Result<(), Failure> {
         let folder = tempfile::tempdir()?;
         let request = MapRequest {
             components: Components::Gz,
+            error: None,
             tolerance: None,
             currents_a: None,
             out: folder.path().join("map"),

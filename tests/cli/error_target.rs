@@ -110,3 +110,85 @@ fn a_bundle_of_a_requested_error_is_recorded_and_verifies() {
     assert!(nodes(headline_of) > nodes(headline));
     assert!(number(&headline_of["force_error"]) <= 0.01);
 }
+
+/// Heights between the points of a ball's cap, against its formula.
+#[test]
+fn discretize_takes_the_fewest_points_that_hold_an_error() {
+    let place = Place::new();
+    let (radius, base, low) = (0.091, 0.011, 0.05);
+    let cap = "primitive = \"half-sphere\"\nradius_mm = 91.0\nbase_mm = 11.0\n";
+    let free = shape(&place, "dome", cap);
+    let mut taken = Vec::new();
+    for error in ["3%", "0.05%"] {
+        let args = [
+            "discretize",
+            &free,
+            "--error",
+            error,
+            "--force",
+            "--format",
+            "json",
+        ];
+        let run = place.run(&args).ends(0).json();
+        assert_eq!(run["requested"]["met"], true);
+        taken.push(run["points"].as_u64().unwrap());
+        let rows: Vec<[f64; 3]> = place
+            .text("points.csv")
+            .lines()
+            .skip(1)
+            .map(|line| {
+                let cells: Vec<f64> = line
+                    .split(',')
+                    .take(3)
+                    .map(|c| c.parse().unwrap())
+                    .collect();
+                [cells[0], cells[1], cells[2]]
+            })
+            .collect();
+        // Neighbours along x: halfway between them the height is off by the most along that line.
+        let mut worst = 0.0_f64;
+        for pair in rows.windows(2).filter(|pair| pair[0][1] == pair[1][1]) {
+            let (x, y) = (0.5 * (pair[0][0] + pair[1][0]), pair[0][1]);
+            let height = base + f64::sqrt(radius * radius - x * x - y * y);
+            let between = 0.5 * (pair[0][2] + pair[1][2]);
+            worst = worst.max((height - between).abs() / height);
+        }
+        let requested = number(&run["requested"]["error"]);
+        assert!(worst > 0.0 && worst <= requested, "{error}: {worst}");
+        assert!(number(&run["min_height_m"]) > low);
+    }
+    assert!(taken[0] < taken[1], "{taken:?}");
+    let given = shape(
+        &place,
+        "given",
+        &format!("{cap}[points]\nx_mm = [-50.0, 50.0, 5]\ny_mm = [-50.0, 50.0, 5]\n"),
+    );
+    let args = ["discretize", &given, "--error", "0.1%", "--force"];
+    place
+        .run(&args)
+        .ends(0)
+        .says(&["0.1 % is exceeded", "--refine"]);
+    place
+        .run(&["discretize", &given, "--error", "1%", "--poisson", "2mm"])
+        .ends(2);
+}
+
+/// Between and at its nodes; more for a smaller error, and the design's own where it gives them.
+#[test]
+fn map_takes_the_fewest_nodes_that_hold_an_error() {
+    let place = Place::new();
+    let nodes = |error: &str| {
+        let args = [
+            "map", SEED, "--error", error, "--refine", "--out", "m", "--force", "--csv",
+            "--format", "json",
+        ];
+        let run = place.run(&args).ends(0).json();
+        assert_eq!(run["requested"]["met"], true, "{error}");
+        let requested = &run["requested"];
+        assert!(number(&requested["of_map"]) <= number(&requested["error"]));
+        run["map"]["x_m"]["samples"].as_u64().unwrap()
+    };
+    assert!(nodes("10%") < nodes("0.3%"));
+    let ran = place.run(&["map", SEED, "--error", "0.01%", "--out", "given"]);
+    ran.ends(0).says(&["0.01 % is exceeded", "--refine"]);
+}

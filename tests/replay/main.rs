@@ -5,4 +5,5 @@
 mod command;
 mod physics;
 mod support;
+mod two_fingers;
 mod vector;

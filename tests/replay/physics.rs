@@ -49,14 +49,14 @@ fn the_force_is_met_exactly_within_the_limits_and_the_nearest_is_given_beyond() 
         let mut per_ampere = vec![0.0; rows.coils];
         for row in 0..rows.len() {
             let currents = rows.currents_a(row);
-            let position = rows.position_m[row];
+            let position = rows.first.position_m[row];
             let inside = opened.bundle.force_per_ampere(position, &mut per_ampere);
             let pull = opened.bundle.passive_force_n(position).unwrap_or(0.0);
             // The force by the bundle's own lookup, not by the loop's.
             let terms = currents.iter().zip(&per_ampere);
             let force: f64 = terms.map(|(i, g)| i * g).sum::<f64>() + pull;
             let size = 1e-12 * (1.0 + force.abs());
-            assert!((force - rows.force_n[row]).abs() < size, "{row}");
+            assert!((force - rows.first.force_n[row]).abs() < size, "{row}");
             for (i, current) in currents.iter().enumerate() {
                 let limits = runtime.current_min_a[i]..=runtime.current_max_a[i];
                 assert!(
@@ -66,20 +66,20 @@ fn the_force_is_met_exactly_within_the_limits_and_the_nearest_is_given_beyond() 
             }
             let total = runtime.total_current_max_a.unwrap();
             assert!(currents.iter().sum::<f64>() <= total * (1.0 + 1e-13));
-            match rows.answer[row] {
+            match rows.first.answer[row] {
                 Answer::Ok => {
                     seen[0] += 1;
                     assert!(
-                        rows.error_n(row).abs() < 1e-13,
+                        rows.first.error_n(row).abs() < 1e-13,
                         "{row}: {}",
-                        rows.error_n(row)
+                        rows.first.error_n(row)
                     );
                 }
                 Answer::Saturated => {
                     seen[1] += 1;
                     // Raising any current that may be raised does not help.
-                    assert!(rows.error_n(row) != 0.0);
-                    let upward = rows.error_n(row) > 0.0;
+                    assert!(rows.first.error_n(row) != 0.0);
+                    let upward = rows.first.error_n(row) > 0.0;
                     let used: f64 = currents.iter().sum();
                     for (i, g) in per_ampere.iter().enumerate() {
                         let helps = (*g > 1e-9) == upward && g.abs() > 1e-9;
@@ -91,7 +91,10 @@ fn the_force_is_met_exactly_within_the_limits_and_the_nearest_is_given_beyond() 
                 Answer::Outside => {
                     seen[2] += 1;
                     assert!(!inside && currents.iter().all(|i| *i == 0.0));
-                    assert_eq!((rows.wanted_force_n[row], rows.force_n[row]), (0.0, 0.0));
+                    assert_eq!(
+                        (rows.first.wanted_force_n[row], rows.first.force_n[row]),
+                        (0.0, 0.0)
+                    );
                 }
             }
         }
@@ -119,8 +122,10 @@ fn no_other_currents_of_the_same_force_are_cooler() {
     let mut random = Random::new(17);
     let mut g = vec![0.0; rows.coils];
     let mut tried = 0;
-    for row in (0..rows.len()).filter(|row| rows.answer[*row] == Answer::Ok) {
-        opened.bundle.force_per_ampere(rows.position_m[row], &mut g);
+    for row in (0..rows.len()).filter(|row| rows.first.answer[*row] == Answer::Ok) {
+        opened
+            .bundle
+            .force_per_ampere(rows.first.position_m[row], &mut g);
         let currents = rows.currents_a(row);
         for _ in 0..20 {
             // A random direction without force, as far as the limits let it go.
@@ -153,6 +158,7 @@ fn step_response(opened: &Opened, step_s: f64, steps: usize) -> (Vec<f64>, Vec<f
     let mut trajectory = Trajectory {
         t_s: vec![0.0],
         position_m: vec![[0.3, 0.0, 0.05]],
+        ..Trajectory::default()
     };
     for k in 0..steps {
         trajectory.t_s.push((k + 1) as f64 * step_s);
@@ -220,7 +226,7 @@ fn slow_trajectories_are_followed_as_if_currents_had_no_lag() {
     let at_once = replayed(&opened, &trajectory, false);
     let slowly = replayed(&opened, &trajectory, true);
     for row in 0..at_once.rows.len() {
-        let apart = (at_once.rows.force_n[row] - slowly.rows.force_n[row]).abs();
+        let apart = (at_once.rows.first.force_n[row] - slowly.rows.first.force_n[row]).abs();
         assert!(apart < 1e-13, "{row}: {apart:e}");
     }
     // At the measured speed the coils in air hardly lag, those with cores do.

@@ -109,6 +109,35 @@ pub fn along_the_normal() -> &'static Bundles {
     })
 }
 
+/// 25 coils whose currents flow both ways, and magnets so weak that they push each other less than the coils do.
+const BOTH_WAYS: [(&str, &str); 3] = [
+    ("rows = 3\ncolumns = 3", "rows = 5\ncolumns = 5"),
+    (
+        "total_current_max_a = 18.0",
+        "total_current_max_a = 50.0\ncurrent_min_a = -2.0",
+    ),
+    ("1.1579e6", "1.1579e5"),
+];
+
+/// The flat surface over such an array in air.
+pub fn both_ways() -> &'static Bundles {
+    static MADE: OnceLock<Bundles> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let changes = [COARSE.as_slice(), &BOTH_WAYS].concat();
+        Bundles::new("designs/seed_air.toml", &changes, &["flat"])
+    })
+}
+
+/// The same with its force along the normal.
+pub fn both_ways_along_the_normal() -> &'static Bundles {
+    static MADE: OnceLock<Bundles> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let changes = [COARSE.as_slice(), &BOTH_WAYS].concat();
+        let (design, shapes) = ("designs/seed_air.toml", ["flat"]);
+        Bundles::of_force(ForceDirection::Normal, design, &changes, &shapes)
+    })
+}
+
 /// Two coupled cored coils with the steel's own pull.
 pub fn coupled() -> &'static Bundles {
     static MADE: OnceLock<Bundles> = OnceLock::new();

@@ -90,15 +90,20 @@ fn the_vector_is_met_where_it_is_within_reach() {
     let rows = &report.rows;
     let mut tilted = 0;
     for row in 0..rows.len() {
-        if rows.answer[row] != Answer::Ok {
+        if rows.first.answer[row] != Answer::Ok {
             continue;
         }
-        let ([wx, wy], [fx, fy]) = (rows.wanted_sideways_n[row], rows.sideways_n[row]);
-        let size = wx.hypot(wy).hypot(rows.wanted_force_n[row]);
+        let ([wx, wy], [fx, fy]) = (
+            rows.first.wanted_sideways_n[row],
+            rows.first.sideways_n[row],
+        );
+        let size = wx.hypot(wy).hypot(rows.first.wanted_force_n[row]);
         assert!((wx - fx).hypot(wy - fy) <= 1e-9, "{row}");
-        assert!(rows.error_n(row).abs() <= 1e-9 && rows.direction_error_deg(row) < 1e-4);
+        assert!(
+            rows.first.error_n(row).abs() <= 1e-9 && rows.first.direction_error_deg(row) < 1e-4
+        );
         // Along the normal the whole force is lambda times the height, less where normals are mixed.
-        let whole = opened.renderer.lambda_n_per_m() * rows.height_m[row];
+        let whole = opened.renderer.lambda_n_per_m() * rows.first.height_m[row];
         assert!(size <= whole * (1.0 + 1e-9), "{row}: {size} of {whole}");
         tilted += usize::from(wx.hypot(wy) > 0.3 * whole && whole > 0.0);
     }

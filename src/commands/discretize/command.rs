@@ -9,7 +9,7 @@ use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
-use crate::cli::args::{SamplingFlags, SurfaceFlags, WeightsFlag, Writing};
+use crate::cli::args::{ErrorFlags, SamplingFlags, SurfaceFlags, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -18,7 +18,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::quantity::{count, extents, length_error, mm, number};
+use crate::cli::quantity::{count, extents, length_error, mm, number, percent};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::scene::cost::of_points;
@@ -36,7 +36,8 @@ use crate::shape::holes::Holes;
 ///
 /// How far the surface departs from bilinear interpolation between the points is certified. After
 /// the normal the table marks walls, rims, creases (with the other face's normal) and overhangs.
-/// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
+/// Instead of the grid's own samples, --error chooses as few as keep heights between the points within it;
+/// instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
 /// points without a pattern; both give each point the area it stands for (weight_m2).
 ///
 /// With --inspect no points are made: the content of the surface's file is reported, in its own unit, with
@@ -74,13 +75,15 @@ pub struct Discretize {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     certify_seconds: u64,
     #[command(flatten)]
+    error: ErrorFlags,
+    #[command(flatten)]
     weights: WeightsFlag,
     #[command(flatten)]
     pub(super) sampling: SamplingFlags,
     /// Report what the surface's file holds and make no points
     #[arg(
         long,
-        conflicts_with_all = ["holes", "certify", "certify_seconds", "max_deviation", "poisson", "out"]
+        conflicts_with_all = ["holes", "certify", "certify_seconds", "max_deviation", "poisson", "out", "error"]
     )]
     pub(super) inspect: bool,
     /// With --inspect: report and draw where the part lies over this design's array and workspace
@@ -170,6 +173,7 @@ impl Discretize {
             certify_seconds: self.certify_seconds,
             picture: self.plot.is_some(),
             weights: self.weights.weights,
+            error: self.error.target(),
         }
     }
 
@@ -298,6 +302,17 @@ impl Discretize {
         );
         if let Some(deviation) = &summary.deviation {
             sheet.line("deviation", &between(deviation));
+        }
+        if let Some(requested) = &summary.requested {
+            sheet.line(
+                "error",
+                &format!(
+                    "{} of the height between the points {} the requested {}",
+                    percent(requested.between_points),
+                    if requested.met { "holds" } else { "exceeds" },
+                    percent(requested.error)
+                ),
+            );
         }
         if let Some(stage) = summary.accuracy.get("points") {
             sheet.line(

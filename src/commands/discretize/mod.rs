@@ -1,5 +1,6 @@
 //! `discretize`: a surface to its constraint points.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use crate::plot::plane::PlanePlot;
 use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{ShapeDocument, SurfaceSource};
@@ -31,13 +33,17 @@ use crate::shape::{
     ConstraintPoints, Discretized, Settings, ShapeError, Surface, discretize_surface,
 };
 
+pub(crate) mod between_points;
 pub(crate) mod command;
+pub(crate) mod fewest_points;
 pub mod inspect;
 mod inspect_command;
 mod picture;
 pub mod scattered;
 mod table;
 
+use between_points::between_points;
+use fewest_points::fewest_points;
 use picture::{PictureData, Scale};
 
 /// The points of a grid and their figures.
@@ -104,6 +110,9 @@ pub struct PointsSummary {
     /// How far the interpolated points may lie from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<DeviationSummary>,
+    /// What became of a requested error; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub requested: Option<RequestedHeights>,
     /// Each part of the heights' error: `points` (rounding), `grid`, `tessellation`.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Warnings for the user.
@@ -195,7 +204,7 @@ impl DeviationSummary {
 }
 
 /// The options of `discretize` for the points of a grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointsOptions {
     /// The treatment of holes.
     pub holes: Holes,
@@ -207,6 +216,8 @@ pub struct PointsOptions {
     pub picture: bool,
     /// How the points count, instead of what the document says.
     pub weights: Option<Weights>,
+    /// The largest error of heights between the points, which are as few as hold it.
+    pub error: Option<ErrorTarget>,
 }
 
 impl PointsOptions {
@@ -218,9 +229,12 @@ impl PointsOptions {
             certify_seconds,
             picture: _,
             weights,
+            error,
         } = *self;
         Options::of(&PointsAsked {
             weights,
+            error: error.map(|target| target.error),
+            refine: error.is_some_and(|target| target.refine),
             holes: Some(holes.name()),
             certify: Some(certify.name()),
             certify_seconds: (certify_seconds != CERTIFY_SECONDS).then_some(certify_seconds),
@@ -241,6 +255,7 @@ impl Default for PointsOptions {
             certify_seconds: CERTIFY_SECONDS,
             picture: false,
             weights: None,
+            error: None,
         }
     }
 }
@@ -269,10 +284,66 @@ pub fn run_with(
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
     let made_with = options.made_with(document, inputs.first());
-    let opened = OpenedSurface::new(document, inputs, progress)?;
-    let mut report = opened.discretize(document, options, None, progress)?;
+    let mut document = Cow::Borrowed(document);
+    let chosen = options
+        .error
+        .filter(|target| target.refine || !document.grid_is_given);
+    if let Some(target) = chosen {
+        let (fewest, _) = fewest_points(&document, progress, |tried| {
+            let opened = OpenedSurface::new(tried, inputs.clone(), progress)?;
+            let report = opened.discretize(tried, options, None, progress)?;
+            let between = between_points(&report).0;
+            Ok(between.map(|part| part.error / target.error))
+        })?;
+        document = Cow::Owned(fewest);
+    }
+    let opened = OpenedSurface::new(&document, inputs, progress)?;
+    let mut report = opened.discretize(&document, options, None, progress)?;
     report.summary.made_with = made_with;
+    if let Some(target) = options.error {
+        report.state_requested(target, chosen.is_some());
+    }
     Ok(report)
+}
+
+impl PointsReport {
+    /// States what became of the requested error of heights between the points, with a warning where it is exceeded.
+    fn state_requested(&mut self, target: ErrorTarget, chosen: bool) {
+        let (between, jumps) = between_points(self);
+        let found = between.map_or(0.0, |part| part.error);
+        let met = found <= target.error;
+        if !met {
+            let advice = if chosen {
+                "; the most points that are tried do not hold it; --max-deviation grades points"
+            } else {
+                "; the shape gives its points, which are obeyed (--refine chooses them)"
+            };
+            let of = "heights between the points are off by up to";
+            self.summary
+                .warnings
+                .push(target.exceeded(of, found, advice));
+        }
+        self.summary.requested = Some(RequestedHeights {
+            error: target.error,
+            met,
+            between_points: found,
+            jumps,
+        });
+    }
+}
+
+/// What became of a requested error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RequestedHeights {
+    /// Requested of heights between the points, relative to the lowest height that is rendered.
+    pub error: f64,
+    /// Whether it holds.
+    pub met: bool,
+    /// The error.
+    pub between_points: f64,
+    /// Share of the points at a jump, which no grid follows and the error leaves out; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jumps: Option<f64>,
 }
 
 /// As [`run`], with the certificate that an earlier run cached for these points and this surface.
@@ -423,6 +494,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
         degenerate_triangles: discretized.mesh.as_ref().map(|mesh| mesh.degenerate),
         hidden: discretized.hidden,
         deviation,
+        requested: None,
         accuracy,
         warnings,
         files: Vec::new(),

@@ -32,6 +32,8 @@ impl Sampling {
         };
         Options::of(&PointsAsked {
             weights: None,
+            error: None,
+            refine: false,
             holes: None,
             certify: None,
             certify_seconds: None,

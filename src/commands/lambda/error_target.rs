@@ -2,12 +2,14 @@
 
 pub use crate::scene::tolerances::ErrorTarget;
 
+use super::LambdaOptions;
 use super::LambdaReport;
 use super::points::{ForcesAt, WantedPoints};
-use super::{LambdaOptions, map_error};
 use crate::RunError;
 use crate::bundle::headline::{RequestedError, RunAtError};
 use crate::commands::discretize;
+use crate::commands::discretize::between_points::between_points;
+use crate::commands::discretize::fewest_points::{SMOOTH, fewest_points};
 use crate::design::Workspace;
 use crate::lambda::{ForceProblem, constant};
 use crate::progress::Progress;
@@ -17,24 +19,6 @@ use crate::scene::passive;
 use crate::scene::steel::Solved;
 use crate::shape::document::{AxisRequest, ShapeDocument};
 
-/// Samples along the longer side of the first grid.
-const FIRST: usize = 17;
-/// Samples along either side, at most: beyond, tables and files are of no use to a runtime.
-const MOST: usize = 769;
-/// Attempts at most.
-const ATTEMPTS: usize = 8;
-/// How much finer a grid becomes from one attempt to the next.
-const FINER: std::ops::RangeInclusive<f64> = 1.2..=3.0;
-/// Orders of convergence that an attempt is trusted to show.
-const ORDERS: std::ops::RangeInclusive<f64> = 0.7..=2.0;
-/// A grid that uses less of its share is wasteful, unless one a little coarser fails.
-const WASTE: f64 = 0.5;
-const CLOSE: f64 = 1.25;
-/// Between one that fails and one that holds with so many times the intervals another is tried: where a
-/// surface ends or breaks, the error falls irregularly.
-const WIDE: f64 = 2.0;
-/// A little more than the law says, so that the next attempt holds.
-const SPARE: f64 = 1.08;
 /// Other errors for which a run is estimated, against this one's.
 const ELSEWHERE: [f64; 2] = [0.1, 10.0];
 /// The order with which the map's interpolation falls.
@@ -76,37 +60,15 @@ impl Trial<'_> {
         let mut chosen = ChosenGrid {
             document: document.clone(),
             fixed: document.grid_is_given && !target.refine,
-            order: *ORDERS.end(),
+            order: SMOOTH,
         };
         if chosen.fixed {
             return Ok(chosen);
         }
-        let of_document = [document.grid.x, document.grid.y].map(AxisRequest::samples);
-        let longest = of_document[0].max(of_document[1]).saturating_sub(1).max(1);
-        let sampled = |intervals: f64| {
-            let factor = intervals / longest as f64;
-            of_document.map(|samples| match samples {
-                1 => 1,
-                more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(5, MOST),
-            })
-        };
-        let most = (MOST - 1) as f64;
-        let mut search = Search::new((FIRST - 1) as f64);
-        for _ in 0..ATTEMPTS {
-            progress.check()?;
-            chosen.document = document.with_samples(sampled(search.intervals));
-            let Some(excess) = self.excess(&chosen.document, target, progress)? else {
-                return Ok(chosen);
-            };
-            if !search.tried(excess, most) {
-                break;
-            }
-        }
-        let intervals = search
-            .fewest
-            .map_or(search.intervals, |(intervals, _)| intervals);
-        chosen.document = document.with_samples(sampled(intervals));
-        chosen.order = search.order;
+        let fewest = fewest_points(document, progress, |document| {
+            self.excess(document, target, progress)
+        })?;
+        (chosen.document, chosen.order) = fewest;
         Ok(chosen)
     }
 
@@ -159,72 +121,13 @@ impl Trial<'_> {
             .error_against_limit(lambda, (&problem, &unwired), with, at)?
             .unwrap_or(1.0);
         let between = match self.for_runtime {
-            true => map_error::between_points(&report).0,
+            true => between_points(&report).0,
             false => None,
         };
         let between = between.map_or(0.0, |part| part.error);
         Ok(Some(
             (of_points / target.of_points()).max(between / target.between_points()),
         ))
-    }
-}
-
-/// A search for the fewest intervals whose excess is 1 or less.
-struct Search {
-    /// Those to be tried.
-    intervals: f64,
-    /// With which power of the spacing the excess falls.
-    order: f64,
-    /// The most that fail, with their excess.
-    most: Option<(f64, f64)>,
-    /// The fewest that hold.
-    fewest: Option<(f64, f64)>,
-}
-
-impl Search {
-    fn new(intervals: f64) -> Self {
-        Self {
-            intervals,
-            order: *ORDERS.end(),
-            most: None,
-            fewest: None,
-        }
-    }
-
-    /// Takes the excess of the intervals that were tried; whether others are worth a try. There are
-    /// at most `most` of them.
-    fn tried(&mut self, excess: f64, most: f64) -> bool {
-        let now = (self.intervals, excess);
-        let before = self.most.or(self.fewest);
-        if let Some((intervals, other)) = before
-            && excess > 0.0
-        {
-            let order = (other / excess).ln() / (now.0 / intervals).ln();
-            if order.is_finite() {
-                self.order = order.clamp(*ORDERS.start(), *ORDERS.end());
-            }
-        }
-        let fails = excess > 1.0;
-        if fails {
-            self.most = Some(now);
-        } else {
-            self.fewest = Some(now);
-        }
-        match (self.most, self.fewest) {
-            // Between what fails and what holds, unless that holds closely.
-            (Some((few, _)), Some((many, excess))) => {
-                self.intervals = (few * many).sqrt().round();
-                let wasteful = excess < WASTE || many > WIDE * few;
-                wasteful && many > CLOSE * few && self.intervals < many
-            }
-            (Some((few, excess)), None) => {
-                let finer = SPARE * excess.powf(1.0 / self.order);
-                self.intervals = (few * finer.clamp(*FINER.start(), *FINER.end())).min(most);
-                few < most
-            }
-            // The first one holds.
-            (None, _) => false,
-        }
     }
 }
 
@@ -282,14 +185,16 @@ impl LambdaReport {
             }
         });
         let over = (!met).then(|| {
-            format!(
-                "the requested error of {:.2} % is exceeded: the computation may add {:.2} %, most of it \
-                 from {}{}{}",
-                100.0 * target.error,
-                100.0 * headline.force_error,
-                headline.budget.first().map_or("nothing", |part| part.part.words()),
-                if fixed.is_empty() { "" } else { "; " },
-                fixed.join("; ")
+            let cause = headline
+                .budget
+                .first()
+                .map_or("nothing", |part| part.part.words());
+            let cause = std::iter::once(format!(", most of it from {cause}"));
+            let advice: Vec<String> = cause.chain(fixed.iter().cloned()).collect();
+            target.exceeded(
+                "the computation may add",
+                headline.force_error,
+                &advice.join("; "),
             )
         });
         headline.requested = Some(RequestedError {

@@ -9,7 +9,7 @@ use super::text::summary;
 use super::vector_field::FEWEST_NODES;
 use super::{MapRequest, run};
 use crate::bundle::write::{MAP_FILES, MapFormats};
-use crate::cli::args::{Tolerance, Writing};
+use crate::cli::args::{ErrorFlags, Tolerance, Writing};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -29,7 +29,8 @@ use crate::scene::cost;
 /// and writes map.npz (NumPy, little-endian doubles with axes and units) and map.json beside it;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
 /// of interpolating between them are stated; of arrays with coupled steel cores also the compact form
-/// that stood for the steel, and its largest error at samples.
+/// that stood for the steel, and its largest error at samples. With --error the nodes are as few as
+/// keep both errors together within it, relative to the largest |dBz/dz| at the height.
 ///
 /// --vfield and --mpem write calibration files of mag_manip, ETH Zurich's runtime for magnetic
 /// manipulation: the field on nodes that span the workspace and one step more, whose error between
@@ -87,6 +88,8 @@ pub struct Map {
     mpem_tolerance: Option<f64>,
     #[command(flatten)]
     writing: Writing,
+    #[command(flatten)]
+    error: ErrorFlags,
     #[command(flatten)]
     tolerance: Tolerance,
 }
@@ -166,6 +169,7 @@ impl Map {
             mag_manip: self.mag_manip(&out)?,
             components: self.components,
             tolerance: self.tolerance.tolerance,
+            error: self.error.target(),
             currents_a: self.currents_a(design)?,
             out,
             formats: MapFormats {

@@ -33,6 +33,7 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel::{self, Solved};
+use crate::scene::tolerances::ErrorTarget;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 
 /// The options of `map`.
@@ -42,6 +43,8 @@ pub struct MapRequest {
     pub components: Components,
     /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
+    /// The largest error of the map, at and between its nodes, which are as few as hold it.
+    pub error: Option<ErrorTarget>,
     /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
     /// curve there is no working point.
     pub currents_a: Option<Vec<f64>>,
@@ -62,6 +65,10 @@ impl MapRequest {
         struct Recorded<'a> {
             components: Components,
             tolerance: Option<f64>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            error: Option<f64>,
+            #[serde(skip_serializing_if = "std::ops::Not::not")]
+            refine: bool,
             currents_a: Option<&'a [f64]>,
             vfield_nodes: Option<usize>,
             mpem_tolerance: Option<f64>,
@@ -69,6 +76,7 @@ impl MapRequest {
         let MapRequest {
             components,
             tolerance,
+            error,
             currents_a,
             out: _,
             formats: _,
@@ -84,6 +92,8 @@ impl MapRequest {
         Options::of(&Recorded {
             components: *components,
             tolerance: *tolerance,
+            error: error.map(|target| target.error),
+            refine: error.is_some_and(|target| target.refine),
             currents_a: currents_a.as_deref(),
             vfield_nodes: *nodes,
             mpem_tolerance: *mpem_tolerance,
@@ -113,6 +123,9 @@ pub struct MapReport {
     /// The compact form of a coupled array's steel, where there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<CompactSteel>,
+    /// What became of a requested error; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub requested: Option<RequestedMap>,
     /// The field on nodes for mag_manip, where requested.
     #[serde(rename = "vfield", skip_serializing_if = "Option::is_none")]
     pub vector_field: Option<VectorFieldSummary>,
@@ -174,7 +187,9 @@ pub fn run(
     request: &MapRequest,
     progress: &dyn Progress,
 ) -> Result<MapReport, RunError> {
-    let scene = Scene::with_tolerance(design, request.tolerance)?;
+    let of_error = request.error.filter(|_| design.core.is_some());
+    let tolerance = request.tolerance.or(of_error.map(ErrorTarget::tolerance));
+    let scene = Scene::with_tolerance(design, tolerance)?;
     let mag_manip = &request.mag_manip;
     let protected: Vec<PathBuf> = design
         .curve_file()
@@ -294,7 +309,16 @@ impl Made {
         let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
         let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
         let solved = solved(scene, lowest_m, progress)?;
-        let map = own_map(scene, &solved, &grid, request.components, progress)?;
+        let (grid, map) = match request
+            .error
+            .filter(|target| target.refine || !scene.design.workspace.is_given)
+        {
+            None => {
+                let map = own_map(scene, &solved, &grid, request.components, progress)?;
+                (grid, map)
+            }
+            Some(target) => fewest_nodes(scene, &solved, target, request.components, progress)?,
+        };
         let tabulated = (&grid, &map.map, lowest_m);
         let together = Together::new(scene, &solved, tabulated, request, progress)?;
         progress.check()?;
@@ -340,6 +364,18 @@ impl Made {
         let core = scene.core.as_ref();
         let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
         warnings.extend(self.together.and_then(|together| together.warning));
+        let requested = request
+            .error
+            .map(|target| RequestedMap::new(&self.map, target));
+        let over = requested.zip(request.error);
+        warnings.extend(over.filter(|(requested, _)| !requested.met).map(|(requested, target)| {
+            let advice = if scene.design.workspace.is_given && !target.refine {
+                "; the design gives the nodes of [workspace], which are obeyed (--refine chooses them)"
+            } else {
+                "; no more nodes are tried: a workspace that begins higher above the coils helps"
+            };
+            target.exceeded("the map is off by up to", requested.of_map, advice)
+        }));
         MapReport {
             accuracy_missed: missed(&sidecar.accuracy, self.solved.tolerance),
             sidecar,
@@ -349,6 +385,7 @@ impl Made {
             distinct_radii: self.map.map.distinct_radii,
             tabulated: self.map.map.tabulated,
             table: self.map.table.map(CompactSteel::from),
+            requested,
             vector_field: self.vector_field.map(|made| made.summary),
             multipoles: self.multipoles.map(|made| made.summary),
             warnings,
@@ -400,6 +437,91 @@ impl Together {
                 mean_field_t: point.mean_field_t,
             },
         }))
+    }
+}
+
+/// What became of a requested error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RequestedMap {
+    /// Requested of the map, at and between its nodes, relative to the largest |dB_z/dz| at the height.
+    pub error: f64,
+    /// Whether it holds.
+    pub met: bool,
+    /// The error.
+    pub of_map: f64,
+}
+
+impl RequestedMap {
+    fn new(made: &SceneMap, target: ErrorTarget) -> Self {
+        let of_map = made.accuracy.estimate + made.between.largest;
+        Self {
+            error: target.error,
+            met: of_map <= target.error,
+            of_map,
+        }
+    }
+}
+
+/// Share of the design's samples that is tried first.
+const FIRST: f64 = 0.2;
+/// Attempts at most.
+const ATTEMPTS: usize = 8;
+/// The interpolation's order.
+const ORDER: f64 = 4.0;
+/// A little more than the law says, so that the next attempt holds.
+const SPARE: f64 = 1.05;
+/// How much finer the nodes become from one attempt to the next.
+const FINER: std::ops::RangeInclusive<f64> = 1.1..=2.0;
+/// Fewest nodes along an axis: those of a cubic.
+const FEWEST: usize = 4;
+/// Most values of all coils' maps that are tried.
+const MOST_VALUES: f64 = 2e7;
+
+/// The fewest nodes of the workspace whose map holds a requested error, or the last that were tried, and the map.
+fn fewest_nodes(
+    scene: &Scene,
+    solved: &Solved,
+    target: ErrorTarget,
+    components: Components,
+    progress: &dyn Progress,
+) -> Result<(Grid, SceneMap), RunError> {
+    let workspace = &scene.design.workspace;
+    let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
+    let sampled = |factor: f64| {
+        axes.map(|mut axis| {
+            if axis.samples > 1 {
+                let intervals = ((axis.samples - 1) as f64 * factor).round();
+                axis.samples = (intervals as usize + 1).max(FEWEST);
+            }
+            axis
+        })
+    };
+    let (mut factor, mut attempt) = (FIRST, 1);
+    loop {
+        progress.check()?;
+        let [x, y, z] = sampled(factor);
+        let grid = Grid {
+            x_m: x.nodes(),
+            y_m: y.nodes(),
+            z_m: z.nodes(),
+        };
+        // The vertical component is the one whose interpolation is judged.
+        let trial = own_map(scene, solved, &grid, Components::Gz, progress)?;
+        let excess = trial.between.largest / (target.error - trial.accuracy.estimate).max(0.0);
+        let finer = factor * (SPARE * excess.powf(1.0 / ORDER)).clamp(*FINER.start(), *FINER.end());
+        let values = sampled(finer)
+            .map(|axis| axis.samples as f64)
+            .iter()
+            .product::<f64>()
+            * scene.coils.len() as f64;
+        if excess <= 1.0 || attempt == ATTEMPTS || values > MOST_VALUES {
+            let map = match components {
+                Components::Gz => trial,
+                _ => own_map(scene, solved, &grid, components, progress)?,
+            };
+            return Ok((grid, map));
+        }
+        (factor, attempt) = (finer, attempt + 1);
     }
 }
 

@@ -53,6 +53,17 @@ pub(super) fn summary(design: &Design, report: &MapReport) -> String {
     if let Some(made) = &report.multipoles {
         sheet.line("mpem", &multipoles(made));
     }
+    if let Some(requested) = &report.requested {
+        sheet.line(
+            "error",
+            &format!(
+                "{} {} the requested {}",
+                percent(requested.of_map),
+                if requested.met { "holds" } else { "exceeds" },
+                percent(requested.error)
+            ),
+        );
+    }
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));

@@ -52,7 +52,8 @@ pub struct Replay {
     bundle: PathBuf,
     /// CSV table with the columns t_s, x_m, y_m, z_m of the magnet's centre; `-` for standard input
     ///
-    /// In seconds and metres.
+    /// In seconds and metres. With x2_m, y2_m, z2_m too a second finger is on the same array: the currents give
+    /// both their force, and make up for the push of their magnets on each other.
     #[arg(value_name = "TRAJECTORY", conflicts_with = "synthesize")]
     trajectory: Option<FileArgument>,
     /// Make a trajectory up instead

@@ -83,8 +83,7 @@ impl Felt {
         step: &Step,
         robust_a: &[f64],
     ) {
-        let wanted = step.sideways.map_or([0.0; 2], |sideways| sideways.wanted_n);
-        let wanted = [wanted[0], wanted[1], step.wanted_n];
+        let wanted = step.wanted_force_n();
         self.positions += 1;
         self.requested_n2 += wanted.iter().map(|part| part * part).sum::<f64>();
         let both = [renderer.plain_a(), robust_a];

@@ -18,12 +18,14 @@ use std::path::{Path, PathBuf};
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::load::Bundle;
-use crate::bundle::replay::{Answer, ReplayRows};
+use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::commands::calibrate::DESIGN_FILE;
-use crate::design::{Design, Driver, Need};
+use crate::design::{Design, Driver, Magnet, Need};
+use crate::numerics::vec3::dot;
 use crate::progress::Progress;
+use crate::scene::moment_a_m2;
 use felt::Felt;
 use renderer::{Renderer, RendererError, Step};
 use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
@@ -86,6 +88,27 @@ impl Opened {
             ))
         })?;
         Ok(self)
+    }
+
+    /// For two fingers.
+    ///
+    /// # Errors
+    /// A bundle without a copy of its design, which has the magnets; one whose currents are chosen for
+    /// uncertainties.
+    fn for_two_fingers(&self) -> Result<(Renderer, Magnet), RunError> {
+        let name = self.bundle.folder.display();
+        if self.renderer.setting().is_some() {
+            return Err(RunError::Input(
+                "currents chosen for uncertainties are those of one finger; leave --robust out with two".to_owned(),
+            ));
+        }
+        let (design, _) = Design::read(&self.bundle.folder.join(DESIGN_FILE), Need::SWEEP)
+            .map_err(|error| RunError::Input(format!(
+                "{name}: two fingers push each other as their magnets do, which the bundle's design must say: {error}"
+            )))?;
+        let renderer = Renderer::two_fingers(&self.bundle, moment_a_m2(&design))
+            .map_err(|error| RunError::Input(format!("{name}: {error}")))?;
+        Ok((renderer, design.magnet))
     }
 
     /// The bundle's files, its seconds, which no manifest lists, among them.
@@ -156,7 +179,8 @@ pub struct ReplayReport {
 /// Replays `trajectory`, which is from `source`.
 ///
 /// # Errors
-/// Positions that must be millimetres; `dynamics` on a bundle without inductances; interruption.
+/// Positions that must be millimetres; two fingers whose magnets would overlap; `dynamics` on a bundle without
+/// inductances; interruption.
 pub fn run(
     opened: &Opened,
     trajectory: &Trajectory,
@@ -164,6 +188,7 @@ pub fn run(
     dynamics: bool,
     progress: &dyn Progress,
 ) -> Result<ReplayReport, RunError> {
+    let two = !trajectory.second_m.is_empty();
     let mut renderer = opened.renderer.clone();
     let ends_m = renderer.map().ends_m();
     if plausible::in_millimetres(trajectory, &ends_m) {
@@ -173,12 +198,19 @@ pub fn run(
             source.source
         )));
     }
+    if two {
+        let (for_two, magnet) = opened.for_two_fingers()?;
+        if let Some(touching) = plausible::touching(trajectory, &magnet) {
+            return Err(RunError::Input(format!("{}: {touching}", source.source)));
+        }
+        renderer = for_two;
+    }
     let mut drive = dynamics.then(|| opened.drive()).transpose()?;
     let bandwidth_hz = opened.bandwidth_hz();
     let warnings = plausible::warnings(trajectory, &ends_m);
     progress.take_seconds();
     let coils = renderer.coils();
-    let mut steps: Vec<Step> = Vec::with_capacity(trajectory.len());
+    let mut steps: Vec<Steps> = Vec::with_capacity(trajectory.len());
     let mut commanded_a = vec![0.0; trajectory.len() * coils];
     // The loop that is timed: what a runtime does, and nothing else.
     progress.begin("replay", trajectory.len() as u64);
@@ -187,7 +219,7 @@ pub fn run(
         let rows = portion * PORTION..((portion + 1) * PORTION).min(trajectory.len());
         for row in rows {
             let currents = &mut commanded_a[row * coils..(row + 1) * coils];
-            steps.push(renderer.step(trajectory.position_m[row], currents));
+            steps.push(Steps::take(&mut renderer, trajectory, row, currents));
         }
     }
     progress.end();
@@ -210,18 +242,70 @@ pub fn run(
         bounds: summary::Bounds::of(&opened.bundle),
         bandwidth_hz,
         felt: opened.felt(trajectory.len()),
+        pushed_n: 0.0,
     };
     let rows = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
+    let pushed_n = follower.pushed_n;
     let felt = follower.felt.as_ref().and_then(Felt::summary);
     let mut summary =
         ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
     summary.force.felt = felt;
+    if let Some(two) = &mut summary.two_fingers {
+        two.magnets_force_n = pushed_n;
+    }
     Ok(ReplayReport {
         rows,
         summary,
         step_s,
         seconds,
     })
+}
+
+/// A step of one finger or two.
+struct Steps {
+    first: Step,
+    second: Option<Step>,
+    /// Force of one magnet on the other, N.
+    pushed_n: f64,
+}
+
+impl Steps {
+    /// That of a row, its currents written to `currents_a`.
+    fn take(
+        renderer: &mut Renderer,
+        trajectory: &Trajectory,
+        row: usize,
+        currents_a: &mut [f64],
+    ) -> Self {
+        let position_m = trajectory.position_m[row];
+        let Some(second_m) = trajectory.second_m.get(row) else {
+            let first = renderer.step(position_m, currents_a);
+            return Self {
+                first,
+                second: None,
+                pushed_n: 0.0,
+            };
+        };
+        let (steps, push_n) = renderer.pair_step([position_m, *second_m], currents_a);
+        let [first, second] = steps;
+        Self {
+            first,
+            second: Some(second),
+            pushed_n: dot(push_n, push_n).sqrt(),
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Step> {
+        std::iter::once(&self.first).chain(&self.second)
+    }
+
+    /// The force on each finger with these currents, N, right after its step.
+    fn given_n(&self, renderer: &Renderer, currents_a: &[f64]) -> [[f64; 3]; 2] {
+        match self.second {
+            None => [renderer.given_n(&self.first, currents_a), [0.0; 3]],
+            Some(second) => renderer.pair_given_n(&[self.first, second], currents_a),
+        }
+    }
 }
 
 /// Goes through the positions again for the numbers that a runtime has no time for.
@@ -234,13 +318,15 @@ struct Follower {
     bandwidth_hz: Option<f64>,
     /// Where currents are chosen for uncertainties.
     felt: Option<Felt>,
+    /// The largest force of one finger's magnet on the other's, N.
+    pushed_n: f64,
 }
 
 impl Follower {
     fn rows(
         &mut self,
         trajectory: &Trajectory,
-        steps: &[Step],
+        steps: &[Steps],
         commanded_a: Vec<f64>,
         mut drive: Option<&mut Drive>,
         progress: &dyn Progress,
@@ -250,18 +336,17 @@ impl Follower {
         let mut rows = ReplayRows {
             coils,
             t_s: trajectory.t_s.clone(),
-            position_m: trajectory.position_m.clone(),
+            second: (!trajectory.second_m.is_empty()).then(FingerRows::default),
             ..ReplayRows::default()
         };
         let mut flowing = vec![0.0; coils];
         let mut again = vec![0.0; coils];
-        for (row, step) in steps.iter().enumerate() {
+        for (row, steps) in steps.iter().enumerate() {
             if row % PORTION == 0 {
                 progress.check()?;
             }
-            let position = trajectory.position_m[row];
             let command = &commanded_a[row * coils..(row + 1) * coils];
-            self.renderer.step(position, &mut again);
+            Steps::take(&mut self.renderer, trajectory, row, &mut again);
             flowing.copy_from_slice(command);
             if let Some(drive) = &mut drive {
                 if row == 0 {
@@ -273,38 +358,33 @@ impl Follower {
                 }
                 drive.currents(&mut flowing);
             }
-            let per_ampere = self.renderer.force_n_per_a();
-            let inside = step.answer != Answer::Outside;
-            let force = |currents: &[f64]| -> f64 {
-                let terms = per_ampere.iter().zip(currents);
-                let sum: f64 = terms.map(|(g, i)| g * i).sum();
-                if inside { sum + step.passive_n } else { 0.0 }
-            };
-            rows.height_m.push(step.height_m);
-            rows.wanted_force_n.push(step.wanted_n);
-            rows.force_n.push(if drive.is_some() {
-                force(&flowing)
-            } else {
-                step.force_n
-            });
-            if let Some(sideways) = step.sideways {
-                rows.wanted_sideways_n.push(sideways.wanted_n);
-                rows.sideways_n.push(if drive.is_some() && inside {
-                    let vectors = self.renderer.force_vectors_n_per_a();
-                    [0, 1].map(|axis| {
-                        let terms = vectors.iter().zip(&flowing);
-                        terms.map(|(g, i)| g[axis] * i).sum()
-                    })
-                } else {
-                    sideways.force_n
-                });
+            let given_n = steps.given_n(&self.renderer, &flowing);
+            let static_n = steps.given_n(&self.renderer, &self.fixed_a);
+            let fingers = std::iter::once(&mut rows.first).chain(&mut rows.second);
+            let all = fingers.zip(steps.iter()).zip(trajectory.fingers());
+            for (finger, ((rows, step), positions_m)) in all.enumerate() {
+                let [x, y, z] = given_n[finger];
+                rows.position_m.push(positions_m[row]);
+                rows.height_m.push(step.height_m);
+                rows.wanted_force_n.push(step.wanted_n);
+                rows.force_n.push(z);
+                if let Some(sideways) = step.sideways {
+                    rows.wanted_sideways_n.push(sideways.wanted_n);
+                    rows.sideways_n.push([x, y]);
+                }
+                rows.static_force_n.push(static_n[finger][2]);
+                rows.answer.push(step.answer);
             }
-            rows.static_force_n.push(force(&self.fixed_a));
-            rows.answer.push(step.answer);
             rows.current_a.extend(&flowing);
-            if inside {
+            self.pushed_n = self.pushed_n.max(steps.pushed_n);
+            let mut answers = steps.iter().map(|step| step.answer);
+            if answers.any(|answer| answer != Answer::Outside) {
+                let (step, position) = (&steps.first, trajectory.position_m[row]);
                 let certificate = self.renderer.certificate(step, command);
-                let largest = self.renderer.map().largest_near_n_per_a(position[2]);
+                let largest = trajectory
+                    .fingers()
+                    .map(|finger| self.renderer.map().largest_near_n_per_a(finger[row][2]));
+                let largest = largest.fold(0.0, f64::max);
                 self.bounds.add(certificate, largest, &flowing);
                 if let Some(felt) = &mut self.felt {
                     felt.add(&self.renderer, position, step, command);

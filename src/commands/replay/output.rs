@@ -8,12 +8,12 @@ use crate::RunError;
 use crate::bundle::artefact::FileEntry;
 use crate::bundle::atomic::{self, FileSet, Overwrite};
 use crate::bundle::json::to_json;
-use crate::bundle::replay::Answer;
+use crate::bundle::replay::{Answer, FingerRows};
 use crate::bundle::seal::to_record;
 use crate::bundle::timing::{ReplayTiming, StageSeconds};
 use crate::bundle::trajectory::Trajectory;
 use crate::plot::drawing::Drawing;
-use crate::plot::replay::ReplayPlot;
+use crate::plot::replay::{FingerCurves, ReplayPlot};
 
 /// Names of the files that go with a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -126,15 +126,23 @@ impl ReplayReport {
     fn plot(&self) -> ReplayPlot<'_> {
         let rows = &self.rows;
         let summary = &self.summary;
+        let curves = |finger| {
+            let finger: &FingerRows = finger;
+            FingerCurves {
+                position_m: &finger.position_m,
+                surface_m: &finger.height_m,
+                inside: (finger.answer.iter())
+                    .map(|answer| *answer != Answer::Outside)
+                    .collect(),
+                requested_n: &finger.wanted_force_n,
+                given_n: &finger.force_n,
+                static_n: &finger.static_force_n,
+            }
+        };
         ReplayPlot {
             title: format!("{} on {}", summary.shape, summary.design),
             t_s: &rows.t_s,
-            position_m: &rows.position_m,
-            surface_m: &rows.height_m,
-            inside: rows.answer.iter().map(|a| *a != Answer::Outside).collect(),
-            requested_n: &rows.wanted_force_n,
-            given_n: &rows.force_n,
-            static_n: &rows.static_force_n,
+            fingers: rows.fingers().map(curves).collect(),
             coils: rows.coils,
             current_a: &rows.current_a,
         }

@@ -1,6 +1,7 @@
 //! Whether a trajectory is plausible, before a replay of it is believed.
 
 use crate::bundle::trajectory::Trajectory;
+use crate::design::Magnet;
 
 /// A time between positions longer than so many median ones is a gap.
 const GAP: f64 = 10.0;
@@ -16,9 +17,10 @@ fn inside(ends_m: &[[f64; 2]; 3], position: [f64; 3]) -> bool {
     axes.all(|([from, to], value)| *from <= value && value <= *to)
 }
 
-/// The number of positions for which that holds.
+/// The number of positions, of all fingers, for which that holds.
 fn count(trajectory: &Trajectory, holds: impl Fn([f64; 3]) -> bool) -> usize {
-    trajectory.position_m.iter().filter(|p| holds(**p)).count()
+    let positions = trajectory.fingers().flatten();
+    positions.filter(|p| holds(**p)).count()
 }
 
 /// Whether a position is metres away, and inside if it is in millimetres.
@@ -31,7 +33,27 @@ fn milli(ends_m: &[[f64; 2]; 3], position: [f64; 3]) -> bool {
 #[must_use]
 pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
     let none = count(trajectory, |p| inside(ends_m, p)) == 0;
-    none && 2 * count(trajectory, |p| milli(ends_m, p)) > trajectory.len()
+    none && 2 * count(trajectory, |p| milli(ends_m, p)) > count(trajectory, |_| true)
+}
+
+/// The first time at which the upright magnets of two fingers would overlap, as a sentence.
+pub(super) fn touching(trajectory: &Trajectory, magnet: &Magnet) -> Option<String> {
+    let pairs = trajectory.position_m.iter().zip(&trajectory.second_m);
+    let apart =
+        pairs.map(|([ax, ay, az], [bx, by, bz])| ((ax - bx).hypot(ay - by), (az - bz).abs()));
+    let mut at = apart.zip(&trajectory.t_s);
+    at.find(|((aside, above), _)| *aside < magnet.diameter_m && *above < magnet.length_m)
+        .map(|((aside, above), t_s)| {
+            let mm = |length_m: f64| (length_m * 1e6).round() / 1e3;
+            format!(
+                "at {t_s} s the two fingers are {} mm apart sideways and {} mm in height, where their magnets, {} mm \
+                 wide and {} mm long, overlap",
+                mm(aside),
+                mm(above),
+                mm(magnet.diameter_m),
+                mm(magnet.length_m)
+            )
+        })
 }
 
 /// Warnings about an implausible trajectory.
@@ -43,7 +65,7 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
         found.push(format!(
             "{milli} of {} positions lie metres away, but inside the map if they are in millimetres: \
              x_m, y_m and z_m must be in metres",
-            trajectory.len()
+            count(trajectory, |_| true)
         ));
     }
     if count(trajectory, |p| inside(ends_m, p)) == 0 {
@@ -94,6 +116,7 @@ mod tests {
         Trajectory {
             t_s: t_s.to_vec(),
             position_m: t_s.iter().map(position).collect(),
+            ..Trajectory::default()
         }
     }
 

@@ -4,6 +4,7 @@ use crate::bundle::force_map::ForceMap;
 use crate::bundle::load::Bundle;
 use crate::bundle::rendering::HeightGrid;
 use crate::bundle::replay::Answer;
+use crate::lambda::two_fingers::{GIVEN, allocate, between_magnets_n};
 use crate::lambda::uncertainty::{RobustForm, RobustRuntime};
 use crate::lambda::{
     Allocation, Allocator, ForceProblem, Reach, VECTOR_MET, VectorAllocation, VectorAllocator,
@@ -22,16 +23,59 @@ pub struct Renderer {
     vector: Option<VectorPart>,
     /// Where currents are chosen for the uncertainties.
     robust: Option<RobustPart>,
+    /// Where there are two fingers.
+    pair: Option<PairPart>,
+}
+
+/// Limits and resistances of the array's currents.
+#[derive(Debug, Clone)]
+struct Limits {
+    resistance_ohm: Vec<f64>,
+    lower_a: Vec<f64>,
+    upper_a: Vec<f64>,
+    total_max_a: Option<f64>,
+}
+
+impl Limits {
+    fn of(bundle: &Bundle) -> Self {
+        let runtime = &bundle.map.runtime;
+        Self {
+            resistance_ohm: runtime.resistance_ohm.clone(),
+            lower_a: runtime.current_min_a.clone(),
+            upper_a: runtime.current_max_a.clone(),
+            total_max_a: runtime.total_current_max_a,
+        }
+    }
+
+    /// A problem without points.
+    fn problem(&self) -> ForceProblem<'_> {
+        ForceProblem {
+            forces_n_per_a: &[],
+            height_m: &[],
+            offset_n: None,
+            weights: None,
+            lower_a: &self.lower_a,
+            upper_a: &self.upper_a,
+            total_max_a: self.total_max_a,
+            resistance_ohm: &self.resistance_ohm,
+        }
+    }
+}
+
+/// What two fingers need.
+#[derive(Debug, Clone)]
+struct PairPart {
+    moment_a_m2: [f64; 3],
+    limits: Limits,
+    /// Forces per ampere of every coil along each axis, finger by finger, N/A.
+    axes_n_per_a: [[Vec<f64>; 3]; 2],
 }
 
 /// What currents chosen for the uncertainties need.
 #[derive(Debug, Clone)]
 struct RobustPart {
     form: RobustForm,
-    resistance_ohm: Vec<f64>,
-    lower_a: Vec<f64>,
-    upper_a: Vec<f64>,
-    total_max_a: Option<f64>,
+    limits: Limits,
     /// Forces per ampere at a place beside the measured one, and one component of them.
     vectors_n_per_a: Vec<[f64; 3]>,
     row_n_per_a: Vec<f64>,
@@ -59,14 +103,24 @@ pub struct Step {
     /// Upward force requested, N: lambda h(x, y), or that part of a force along the normal; 0 where there
     /// is no surface and outside the map.
     pub wanted_n: f64,
-    /// The upward force of the commanded currents, the unpowered steel's pull included, N.
+    /// The upward force of the commanded currents and of all that pulls without currents, N.
     pub force_n: f64,
     /// The sideways force; `None` where the upward one alone is requested.
     pub sideways: Option<SidewaysStep>,
-    /// That pull, N.
-    pub passive_n: f64,
-    /// How the currents were chosen; `None` outside the map and where they were chosen for the uncertainties.
+    /// The force without currents, N: the pull of the unpowered steel and the push of a second magnet.
+    pub without_currents_n: [f64; 3],
+    /// How the currents were chosen; `None` outside the map, with two fingers, and where they were chosen for the
+    /// uncertainties.
     pub allocation: Option<Chosen>,
+}
+
+impl Step {
+    /// The requested force, N; none sideways where the upward force alone is requested.
+    #[must_use]
+    pub fn wanted_force_n(&self) -> [f64; 3] {
+        let [x, y] = self.sideways.map_or([0.0; 2], |sideways| sideways.wanted_n);
+        [x, y, self.wanted_n]
+    }
 }
 
 /// The sideways force of a step, along x and y.
@@ -151,7 +205,24 @@ impl Renderer {
             allocator,
             lambda_n_per_m,
             robust: None,
+            pair: None,
         })
+    }
+
+    /// As [`Renderer::new`], for two fingers whose magnets have this moment, A m^2.
+    ///
+    /// # Errors
+    /// See [`RendererError`].
+    pub fn two_fingers(bundle: &Bundle, moment_a_m2: [f64; 3]) -> Result<Self, RendererError> {
+        let mut renderer = Self::new(bundle)?;
+        let coils = renderer.coils();
+        let finger = || std::array::from_fn(|_| vec![0.0; coils]);
+        renderer.pair = Some(PairPart {
+            moment_a_m2,
+            limits: Limits::of(bundle),
+            axes_n_per_a: [finger(), finger()],
+        });
+        Ok(renderer)
     }
 
     /// As [`Renderer::new`], with the currents of the least expected error under the uncertainties that the
@@ -167,10 +238,7 @@ impl Renderer {
         let coils = renderer.coils();
         renderer.robust = Some(RobustPart {
             form: RobustForm::new(setting, coils),
-            resistance_ohm: runtime.resistance_ohm.clone(),
-            lower_a: runtime.current_min_a.clone(),
-            upper_a: runtime.current_max_a.clone(),
-            total_max_a: runtime.total_current_max_a,
+            limits: Limits::of(bundle),
             vectors_n_per_a: vec![[0.0; 3]; coils],
             row_n_per_a: vec![0.0; coils],
             plain_a: vec![0.0; coils],
@@ -236,7 +304,7 @@ impl Renderer {
             wanted_n,
             force_n: found.force_n + passive_n,
             sideways: None,
-            passive_n,
+            without_currents_n: [0.0, 0.0, passive_n],
             allocation: Some(Chosen::Upward(found)),
         }
     }
@@ -271,7 +339,7 @@ impl Renderer {
                 wanted_n: [wanted_x, wanted_y],
                 force_n: [force_x, force_y],
             }),
-            passive_n,
+            without_currents_n: [0.0, 0.0, passive_n],
             allocation: Some(Chosen::Vector(found)),
         }
     }
@@ -286,8 +354,7 @@ impl Renderer {
         let Some(part) = &mut self.robust else { return };
         let currents = &mut currents_a[..part.plain_a.len()];
         part.plain_a.copy_from_slice(currents);
-        let wanted = step.sideways.map_or([0.0; 2], |sideways| sideways.wanted_n);
-        let wanted = [wanted[0], wanted[1], step.wanted_n];
+        let wanted = step.wanted_force_n();
         let axes = if step.sideways.is_some() { 0..3 } else { 2..3 };
         part.form.clear();
         let setting = *part.form.setting();
@@ -311,26 +378,143 @@ impl Renderer {
                     .add(&part.row_n_per_a, wanted[axis] - pull_n, weight);
             }
         }
-        let limits = ForceProblem {
-            forces_n_per_a: &[],
-            height_m: &[],
-            offset_n: None,
-            weights: None,
-            lower_a: &part.lower_a,
-            upper_a: &part.upper_a,
-            total_max_a: part.total_max_a,
-            resistance_ohm: &part.resistance_ohm,
-        };
-        part.form.minimise(&limits, currents);
-        let given = |force: &dyn Fn(usize) -> f64| -> f64 {
-            let terms = currents.iter().enumerate();
-            terms.map(|(coil, current)| force(coil) * current).sum()
-        };
-        step.force_n = step.passive_n + given(&|coil| self.force_n_per_a[coil]);
-        if let (Some(sideways), Some(vector)) = (&mut step.sideways, &self.vector) {
-            sideways.force_n = [0, 1].map(|axis| given(&|coil| vector.force_n_per_a[coil][axis]));
+        part.form.minimise(&part.limits.problem(), currents);
+        let [force_x, force_y, force_z] = self.given_n(step, currents);
+        step.force_n = force_z;
+        if let Some(sideways) = &mut step.sideways {
+            sideways.force_n = [force_x, force_y];
         }
         step.allocation = None;
+    }
+
+    /// The force on the finger with these currents at the last step, N; sideways only that without currents where
+    /// the upward force alone is requested. None outside the map.
+    #[must_use]
+    pub fn given_n(&self, step: &Step, currents_a: &[f64]) -> [f64; 3] {
+        if step.answer == Answer::Outside {
+            return [0.0; 3];
+        }
+        let given = |force: &dyn Fn(usize) -> f64| -> f64 {
+            let terms = currents_a.iter().enumerate();
+            terms.map(|(coil, current)| force(coil) * current).sum()
+        };
+        let [mut x, mut y, z] = step.without_currents_n;
+        if let Some(part) = &self.vector {
+            x += given(&|coil| part.force_n_per_a[coil][0]);
+            y += given(&|coil| part.force_n_per_a[coil][1]);
+        }
+        [x, y, given(&|coil| self.force_n_per_a[coil]) + z]
+    }
+
+    /// As [`Renderer::given_n`], for either finger after [`Renderer::pair_step`].
+    #[must_use]
+    pub fn pair_given_n(&self, steps: &[Step; 2], currents_a: &[f64]) -> [[f64; 3]; 2] {
+        let Some(part) = &self.pair else {
+            return [[0.0; 3]; 2];
+        };
+        std::array::from_fn(|finger| {
+            let step = &steps[finger];
+            if step.answer == Answer::Outside {
+                return [0.0; 3];
+            }
+            std::array::from_fn(|axis| {
+                let row = part.axes_n_per_a[finger][axis].iter();
+                let sum: f64 = row.zip(currents_a).map(|(g, i)| g * i).sum();
+                sum + step.without_currents_n[axis]
+            })
+        })
+    }
+
+    /// Writes the currents (A) to command with fingers at both positions, m: those of least power that give both
+    /// their force, or the nearest in the sum of squares. Their magnets push each other as dipoles do, which
+    /// the currents make up for; the force on the second one is stated too, N. A finger outside the map is given
+    /// nothing and counts for nothing.
+    ///
+    /// # Panics
+    /// When `currents_a` is shorter than the array.
+    pub fn pair_step(
+        &mut self,
+        positions_m: [[f64; 3]; 2],
+        currents_a: &mut [f64],
+    ) -> ([Step; 2], [f64; 3]) {
+        // Each alone first: what is requested, and the forces per ampere there.
+        let mut steps = positions_m.map(|_| self.outside(currents_a));
+        for finger in 0..2 {
+            steps[finger] = self.step(positions_m[finger], currents_a);
+            self.remember(finger);
+        }
+        let mut on_second = [0.0; 3];
+        let Some(part) = &mut self.pair else {
+            return (steps, on_second);
+        };
+        let currents = &mut currents_a[..part.limits.resistance_ohm.len()];
+        currents.fill(0.0);
+        let inside = steps.map(|step| step.answer != Answer::Outside);
+        if inside == [true; 2] {
+            let [first, second] = positions_m;
+            let between = std::array::from_fn(|axis| second[axis] - first[axis]);
+            on_second = between_magnets_n(part.moment_a_m2, between);
+            let pushes = [on_second.map(|push| -push), on_second];
+            for (step, push) in steps.iter_mut().zip(pushes) {
+                for (sum, push) in step.without_currents_n.iter_mut().zip(push) {
+                    *sum += push;
+                }
+            }
+        }
+        let of_vector = self.vector.is_some();
+        let first_axis = if of_vector { 0 } else { 2 };
+        let mut rows = Vec::with_capacity(6);
+        for (finger, step) in steps.iter().enumerate().filter(|(at, _)| inside[*at]) {
+            let requested_n = step.wanted_force_n().into_iter();
+            let of_currents = requested_n
+                .zip(step.without_currents_n)
+                .map(|(all, n)| all - n);
+            let axes = part.axes_n_per_a[finger].iter().map(Vec::as_slice);
+            rows.extend(axes.zip(of_currents).skip(first_axis));
+        }
+        allocate(&part.limits.problem(), &rows, currents);
+        let given = self.pair_given_n(&steps, currents);
+        let length = |force: [f64; 3]| force.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let terms = steps
+            .iter()
+            .flat_map(|step| [step.wanted_force_n(), step.without_currents_n]);
+        let tolerated_n = GIVEN * terms.map(length).fold(0.0, f64::max);
+        for (step, force) in steps.iter_mut().zip(given) {
+            if step.answer == Answer::Outside {
+                continue;
+            }
+            let wanted = step.wanted_force_n();
+            let error_n = length(std::array::from_fn(|axis| {
+                if axis < first_axis {
+                    0.0
+                } else {
+                    wanted[axis] - force[axis]
+                }
+            }));
+            step.answer = if error_n <= tolerated_n {
+                Answer::Ok
+            } else {
+                Answer::Saturated
+            };
+            step.force_n = force[2];
+            if let Some(sideways) = &mut step.sideways {
+                sideways.force_n = [force[0], force[1]];
+            }
+            step.allocation = None;
+        }
+        (steps, on_second)
+    }
+
+    /// Takes the forces per ampere of the last step for those of a finger of two.
+    fn remember(&mut self, finger: usize) {
+        let Some(part) = &mut self.pair else { return };
+        let [x, y, z] = &mut part.axes_n_per_a[finger];
+        z.copy_from_slice(&self.force_n_per_a);
+        if let Some(vector) = &self.vector {
+            for (coil, force) in vector.force_n_per_a.iter().enumerate() {
+                (x[coil], y[coil]) = (force[0], force[1]);
+            }
+        }
     }
 
     /// The setting of the uncertainties, where currents are chosen for them.
@@ -365,7 +549,7 @@ impl Renderer {
                 wanted_n: [0.0; 2],
                 force_n: [0.0; 2],
             }),
-            passive_n: 0.0,
+            without_currents_n: [0.0; 3],
             allocation: None,
         }
     }
@@ -394,7 +578,7 @@ impl Renderer {
     /// checked; 1 where they are not met. 0 outside the map.
     #[must_use]
     pub fn certificate(&self, step: &Step, currents_a: &[f64]) -> f64 {
-        let wanted_n = step.wanted_n - step.passive_n;
+        let wanted_n = step.wanted_n - step.without_currents_n[2];
         match step.allocation {
             None => 0.0,
             Some(Chosen::Upward(found)) => {

@@ -10,7 +10,7 @@ use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::bundle::load::Bundle;
-use crate::bundle::replay::{Answer, ReplayRows};
+use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::force_direction::ForceDirection;
@@ -51,9 +51,12 @@ pub struct ReplaySummary {
     pub currents: CurrentSummary,
     /// Heat in the coils.
     pub power: PowerSummary,
-    /// Part of the time during which the limits allow only the nearest force.
+    /// A second finger; absent with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub two_fingers: Option<TwoFingers>,
+    /// Part of the time during which the limits allow only the nearest force, of two fingers on either.
     pub saturated_time_fraction: f64,
-    /// Part of the time outside the map.
+    /// Part of the time outside the map, of two fingers with either.
     pub outside_time_fraction: f64,
     /// How fast the currents follow; null where they are taken to follow at once.
     pub dynamics: Option<DynamicsSummary>,
@@ -76,6 +79,17 @@ pub struct TrajectorySummary {
     pub duration_s: f64,
     /// Median time between two, s.
     pub median_step_s: f64,
+}
+
+/// A second finger on the same array.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TwoFingers {
+    /// Part of the time during which both get their force.
+    pub both_given_time_fraction: f64,
+    /// The largest force of one magnet on the other, as dipoles, N.
+    pub magnets_force_n: f64,
+    /// Forces on the second one.
+    pub second: ForceSummary,
 }
 
 /// Forces along a trajectory.
@@ -223,12 +237,13 @@ impl Bounds {
         self.certificate = self.certificate.max(certificate);
     }
 
-    /// Currents chosen for uncertainties (`robust`) are not those of eq. 8, whose conditions are looked at.
+    /// Currents chosen for uncertainties or for two fingers (`other`) are not those of eq. 8, whose conditions are
+    /// looked at.
     fn stages(
         &self,
         bundle: &Bundle,
         dynamics: bool,
-        robust: bool,
+        other: bool,
     ) -> BTreeMap<&'static str, StageAccuracy> {
         let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
             estimate,
@@ -254,7 +269,7 @@ impl Bounds {
                 ),
             ),
         ]);
-        if robust {
+        if other {
             stages.remove("allocation");
         }
         let inductances = bundle.manifest.accuracy.get("inductances");
@@ -278,10 +293,12 @@ impl ReplaySummary {
         let robust = opened.renderer.setting().is_some();
         let trajectory = Trajectory {
             t_s: rows.t_s.clone(),
-            position_m: rows.position_m.clone(),
+            ..Trajectory::default()
         };
         let times = Times::new(&trajectory);
         let size = |most: f64, value: f64| most.max(value.abs());
+        let direction = bundle.manifest.force.as_ref().map(|force| force.direction);
+        let any = |answer: Answer| times.part(rows, |finger, row| finger.answer[row] == answer);
         let resistance_ohm = &bundle.map.runtime.resistance_ohm;
         let heat = |currents: &[f64]| -> f64 {
             let terms = currents.iter().zip(resistance_ohm);
@@ -311,14 +328,13 @@ impl ReplaySummary {
                     .map_or(0.0, |(b, a)| b - a),
                 median_step_s: trajectory.median_step_s(),
             },
-            force: ForceSummary {
-                wanted_max_n: rows.wanted_force_n.iter().copied().fold(0.0, size),
-                feedback: errors(rows, |row| rows.error_n(row)),
-                fixed: errors(rows, |row| rows.static_error_n(row)),
-                vector: (bundle.manifest.force.as_ref())
-                    .and_then(|force| vector_errors(rows, force.direction)),
-                felt: None,
-            },
+            force: ForceSummary::of(&rows.first, &rows.t_s, direction),
+            two_fingers: rows.second.as_ref().map(|second| TwoFingers {
+                both_given_time_fraction: 1.0
+                    - times.part(rows, |finger, row| finger.answer[row] != Answer::Ok),
+                magnets_force_n: 0.0,
+                second: ForceSummary::of(second, &rows.t_s, direction),
+            }),
             currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
                 rms_a: (0..rows.coils)
@@ -331,9 +347,9 @@ impl ReplaySummary {
                 max_w: heats.iter().copied().fold(0.0, f64::max),
                 static_w: heat(&fixed),
             },
-            saturated_time_fraction: times.part(rows, Answer::Saturated),
-            outside_time_fraction: times.part(rows, Answer::Outside),
-            accuracy: bounds.stages(bundle, dynamics.is_some(), robust),
+            saturated_time_fraction: any(Answer::Saturated),
+            outside_time_fraction: any(Answer::Outside),
+            accuracy: bounds.stages(bundle, dynamics.is_some(), robust || rows.second.is_some()),
             dynamics,
             warnings,
             files: Vec::new(),
@@ -341,12 +357,26 @@ impl ReplaySummary {
     }
 }
 
+impl ForceSummary {
+    /// Of one finger, where the force requested points in `direction`.
+    fn of(rows: &FingerRows, t_s: &[f64], direction: Option<ForceDirection>) -> Self {
+        let largest = |most: f64, value: &f64| most.max(value.abs());
+        Self {
+            wanted_max_n: rows.wanted_force_n.iter().fold(0.0, largest),
+            feedback: errors(rows, t_s, |row| rows.error_n(row)),
+            fixed: errors(rows, t_s, |row| rows.static_error_n(row)),
+            vector: direction.and_then(|direction| vector_errors(rows, direction)),
+            felt: None,
+        }
+    }
+}
+
 /// `None` where the upward force alone is requested.
-fn vector_errors(rows: &ReplayRows, direction: ForceDirection) -> Option<VectorErrors> {
+fn vector_errors(rows: &FingerRows, direction: ForceDirection) -> Option<VectorErrors> {
     if rows.sideways_n.is_empty() {
         return None;
     }
-    let inside = (0..rows.len()).filter(|&row| rows.answer[row] != Answer::Outside);
+    let inside = rows.inside();
     let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0);
     let mut angles_deg = Vec::new();
     for row in inside {
@@ -397,20 +427,16 @@ impl Times {
         sum / self.total
     }
 
-    fn part(&self, rows: &ReplayRows, answer: Answer) -> f64 {
-        let is = rows
-            .answer
-            .iter()
-            .map(|a| f64::from(u8::from(*a == answer)));
-        self.mean(is)
+    /// The part during which that holds of any finger.
+    fn part(&self, rows: &ReplayRows, holds: impl Fn(&FingerRows, usize) -> bool) -> f64 {
+        let any = |row: usize| rows.fingers().any(|finger| holds(finger, row));
+        self.mean((0..rows.len()).map(|row| f64::from(u8::from(any(row)))))
     }
 }
 
 /// Errors over the positions inside the map.
-fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorSummary {
-    let inside: Vec<usize> = (0..rows.len())
-        .filter(|&row| rows.answer[row] != Answer::Outside)
-        .collect();
+fn errors(rows: &FingerRows, t_s: &[f64], error: impl Fn(usize) -> f64) -> ErrorSummary {
+    let inside: Vec<usize> = rows.inside().collect();
     let rms = |value: &dyn Fn(usize) -> f64| -> f64 {
         let sum: f64 = inside.iter().map(|&row| value(row) * value(row)).sum();
         (sum / inside.len().max(1) as f64).sqrt()
@@ -430,7 +456,7 @@ fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorSummary {
         worst_at: worst.map(|row| {
             let [x_m, y_m, z_m] = rows.position_m[row];
             TimedPlace {
-                t_s: rows.t_s[row],
+                t_s: t_s[row],
                 x_m,
                 y_m,
                 z_m,

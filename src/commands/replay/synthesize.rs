@@ -76,6 +76,7 @@ impl Synthesis {
         Trajectory {
             t_s,
             position_m: position_m.into_iter().map(|p| p.map(rounded)).collect(),
+            second_m: Vec::new(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::ReplayReport;
 use super::felt::FeltErrors;
-use super::summary::{ErrorSummary, ReplaySummary, VectorErrors};
+use super::summary::{ErrorSummary, ForceSummary, ReplaySummary, VectorErrors};
 use crate::cli::layout::Sheet;
 use crate::cli::quantity::{count, error, force, number, number_to, percent, si};
 use crate::force_direction::ForceDirection;
@@ -31,16 +31,15 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
             force(summary.force.wanted_max_n)
         ),
     );
-    sheet.line("feedback", &errors(&summary.force.feedback));
-    if let Some(vector) = &summary.force.vector {
+    forces(&mut sheet, "feedback", &summary.force);
+    if let Some(two) = &summary.two_fingers {
+        forces(&mut sheet, "second", &two.second);
         sheet.line(
-            "direction",
+            "two fingers",
             &format!(
-                "with feedback off by a median of {} degrees, 95 % within {}; error of the vector rms {}, worst {}",
-                number_to(vector.direction_median_deg, 3),
-                number_to(vector.direction_95_deg, 3),
-                newton(vector.rms_error_n),
-                newton(vector.worst_error_n)
+                "both get their force {} of the time; their magnets push each other by up to {}",
+                percent(two.both_given_time_fraction),
+                newton(two.magnets_force_n)
             ),
         );
     }
@@ -91,6 +90,21 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
     sheet.finish()
 }
 
+/// The forces on a finger with feedback.
+fn forces(sheet: &mut Sheet, title: &str, force: &ForceSummary) {
+    let mut line = errors(&force.feedback);
+    if let Some(vector) = &force.vector {
+        line += &format!(
+            "\ndirection off by a median of {} degrees, 95 % within {}; error of the vector rms {}, worst {}",
+            number_to(vector.direction_median_deg, 3),
+            number_to(vector.direction_95_deg, 3),
+            newton(vector.rms_error_n),
+            newton(vector.worst_error_n)
+        );
+    }
+    sheet.line(title, &line);
+}
+
 /// The limits, the lag of the currents and the accuracy.
 fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
     sheet.line(
@@ -115,15 +129,16 @@ fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
         );
     }
     if let Some(stage) = summary.accuracy.get("force").filter(|s| s.estimate > 0.0) {
+        let optimality = summary
+            .accuracy
+            .get("allocation")
+            .map(|stage| format!("; optimality of the currents {}", error(stage.estimate)));
         sheet.line(
             "accuracy",
             &format!(
-                "forces to {} N by the map's stated errors; optimality of the currents {}",
+                "forces to {} N by the map's stated errors{}",
                 error(stage.estimate),
-                summary
-                    .accuracy
-                    .get("allocation")
-                    .map_or_else(String::new, |stage| error(stage.estimate))
+                optimality.unwrap_or_default()
             ),
         );
     }

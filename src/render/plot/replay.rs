@@ -19,10 +19,9 @@ const NAMED: usize = 12;
 const THIN: f64 = 1.2;
 const THICK: f64 = 2.4;
 /// Colours that stay apart for the colour-blind and in print.
-const FINGER: &str = "#0072b2";
+const FINGERS: [&str; 2] = ["#0072b2", "#009e73"];
 const SURFACE: &str = "#7f7f7f";
 const REQUESTED: &str = "#b5b5b5";
-const GIVEN: &str = "#0072b2";
 const FIXED: &str = "#d55e00";
 pub(super) const COILS: [&str; 9] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c510a",
@@ -36,6 +35,17 @@ pub struct ReplayPlot<'a> {
     pub title: String,
     /// s.
     pub t_s: &'a [f64],
+    /// One or two, each with its own colour.
+    pub fingers: Vec<FingerCurves<'a>>,
+    /// Number of coils.
+    pub coils: usize,
+    /// Coil by coil within a position, A.
+    pub current_a: &'a [f64],
+}
+
+/// What one finger is given; one entry per position.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FingerCurves<'a> {
     /// m.
     pub position_m: &'a [[f64; 3]],
     /// Height of the surface there, m; 0 where there is none.
@@ -48,10 +58,6 @@ pub struct ReplayPlot<'a> {
     pub given_n: &'a [f64],
     /// With fixed currents, N.
     pub static_n: &'a [f64],
-    /// Number of coils.
-    pub coils: usize,
-    /// Coil by coil within a position, A.
-    pub current_a: &'a [f64],
 }
 
 impl ReplayPlot<'_> {
@@ -72,13 +78,20 @@ impl ReplayPlot<'_> {
 
     fn legend(&self) -> Vec<LegendEntry> {
         let mut entries = vec![
-            entry("finger", FINGER, LegendShape::Circle),
+            entry(
+                "finger, force with feedback",
+                FINGERS[0],
+                LegendShape::Circle,
+            ),
             entry("outside the map", FIXED, LegendShape::Circle),
             entry("surface below it", SURFACE, LegendShape::Line),
             entry("force requested", REQUESTED, LegendShape::Line),
-            entry("force with feedback", GIVEN, LegendShape::Line),
             entry("force with fixed currents", FIXED, LegendShape::Line),
         ];
+        if self.fingers.len() > 1 {
+            let second = entry("second finger", FINGERS[1], LegendShape::Circle);
+            entries.insert(1, second);
+        }
         if self.coils <= NAMED {
             entries.extend((0..self.coils).map(|coil| {
                 let colour = COILS[coil % COILS.len()];
@@ -88,19 +101,29 @@ impl ReplayPlot<'_> {
         entries
     }
 
-    /// The finger seen from above.
+    /// The fingers with their colours.
+    fn coloured(&self) -> impl Iterator<Item = (&FingerCurves<'_>, &'static str)> {
+        self.fingers.iter().zip(FINGERS)
+    }
+
+    /// The fingers seen from above.
     fn plan(&self) -> (Vec<Plot>, Layout) {
-        let mm = |k: usize| -> Vec<f64> { self.position_m.iter().map(|p| p[k] * 1e3).collect() };
-        let (x, y) = (mm(0), mm(1));
-        let part = |inside: bool, colour: &str| {
-            let rows = (0..x.len()).filter(|row| self.inside[*row] == inside);
-            let every = x.len().div_ceil(4 * PARTS).max(1);
-            let points: Vec<(f64, f64)> = rows.step_by(every).map(|row| (x[row], y[row])).collect();
-            let dots = ScatterPlot::new().with_color(colour).with_size(1.6);
-            Plot::Scatter(dots.with_data(points))
+        let mut plots = Vec::new();
+        for (finger, colour) in self.coloured() {
+            let every = finger.position_m.len().div_ceil(4 * PARTS).max(1);
+            for (inside, colour) in [(true, colour), (false, FIXED)] {
+                let rows = finger.position_m.iter().zip(&finger.inside);
+                let points = rows.filter(|(_, is)| **is == inside).step_by(every);
+                let points: Vec<_> = points.map(|([x, y, _], _)| (x * 1e3, y * 1e3)).collect();
+                let dots = ScatterPlot::new().with_color(colour).with_size(1.6);
+                plots.push(Plot::Scatter(dots.with_data(points)));
+            }
+        }
+        let mm = |axis: usize| {
+            let positions = self.fingers.iter().flat_map(|finger| finger.position_m);
+            extent(positions.map(move |position| position[axis] * 1e3))
         };
-        let plots = vec![part(true, FINGER), part(false, FIXED)];
-        let layout = Layout::new(extent(x.iter().copied()), extent(y.iter().copied()))
+        let layout = Layout::new(mm(0), mm(1))
             .with_title("seen from above")
             .with_x_label("x / mm")
             .with_y_label("y / mm");
@@ -108,28 +131,35 @@ impl ReplayPlot<'_> {
     }
 
     fn heights(&self) -> (Vec<Plot>, Layout) {
-        let finger: Vec<f64> = self.position_m.iter().map(|p| p[2] * 1e3).collect();
-        let surface: Vec<f64> = self.surface_m.iter().map(|h| h * 1e3).collect();
-        let felt: Vec<bool> = self.surface_m.iter().map(|h| *h != 0.0).collect();
-        let mut plots = self.lines(&surface, &felt, SURFACE, THICK);
-        plots.extend(self.lines(&finger, &self.all(), FINGER, THIN));
-        let shown = surface.iter().zip(&felt).filter(|(_, felt)| **felt);
-        let values = finger.iter().copied().chain(shown.map(|(h, _)| *h));
-        let layout = self.over_time(extent(values), "height", "z / mm");
+        let (mut plots, mut values) = (Vec::new(), Vec::new());
+        for (finger, colour) in self.coloured() {
+            let height: Vec<f64> = finger.position_m.iter().map(|p| p[2] * 1e3).collect();
+            let surface: Vec<f64> = finger.surface_m.iter().map(|h| h * 1e3).collect();
+            let felt: Vec<bool> = finger.surface_m.iter().map(|h| *h != 0.0).collect();
+            plots.extend(self.lines(&surface, &felt, SURFACE, THICK));
+            plots.extend(self.lines(&height, &self.all(), colour, THIN));
+            let shown = surface.iter().zip(&felt).filter(|(_, felt)| **felt);
+            values.extend(height.iter().copied().chain(shown.map(|(h, _)| *h)));
+        }
+        let layout = self.over_time(extent(values.into_iter()), "height", "z / mm");
         (plots, layout)
     }
 
     fn forces(&self) -> (Vec<Plot>, Layout) {
         let mn = |values: &[f64]| -> Vec<f64> { values.iter().map(|f| f * 1e3).collect() };
-        let (requested, given, fixed) = (mn(self.requested_n), mn(self.given_n), mn(self.static_n));
         let all = self.all();
-        let mut plots = self.lines(&requested, &all, REQUESTED, 2.0 * THICK);
-        plots.extend(self.lines(&fixed, &self.inside, FIXED, THIN));
-        plots.extend(self.lines(&given, &all, GIVEN, THIN));
-        let values = requested.iter().chain(&given).chain(&fixed).copied();
+        let (mut plots, mut values) = (Vec::new(), Vec::new());
+        for (finger, colour) in self.coloured() {
+            let curves = [finger.requested_n, finger.static_n, finger.given_n].map(mn);
+            let [requested, fixed, given] = &curves;
+            plots.extend(self.lines(requested, &all, REQUESTED, 2.0 * THICK));
+            plots.extend(self.lines(fixed, &finger.inside, FIXED, THIN));
+            plots.extend(self.lines(given, &all, colour, THIN));
+            values.extend(curves.into_iter().flatten());
+        }
         (
             plots,
-            self.over_time(extent(values), "upward force", "F / mN"),
+            self.over_time(extent(values.into_iter()), "upward force", "F / mN"),
         )
     }
 
@@ -176,7 +206,12 @@ impl ReplayPlot<'_> {
         pieces.into_iter().map(line).collect()
     }
 
-    /// Axes over time, with the times outside the map shaded.
+    /// Whether every finger is inside the map.
+    fn inside(&self, row: usize) -> bool {
+        self.fingers.iter().all(|finger| finger.inside[row])
+    }
+
+    /// Axes over time, with the times at which a finger is outside the map shaded.
     fn over_time(&self, values: (f64, f64), title: &str, label: &str) -> Layout {
         let from = self.t_s.first().copied().unwrap_or(0.0);
         let to = self.t_s.last().copied().unwrap_or(1.0).max(from + 1e-9);
@@ -184,12 +219,11 @@ impl ReplayPlot<'_> {
             .with_title(title)
             .with_x_label("t / s")
             .with_y_label(label);
-        let mut row = 0;
-        while row < self.inside.len() {
-            let end = (row..self.inside.len())
-                .find(|k| self.inside[*k] != self.inside[row])
-                .unwrap_or(self.inside.len());
-            if !self.inside[row] {
+        let (mut row, rows) = (0, self.t_s.len());
+        while row < rows {
+            let end = (row..rows).find(|k| self.inside(*k) != self.inside(row));
+            let end = end.unwrap_or(rows);
+            if !self.inside(row) {
                 let until = self.t_s.get(end).copied().unwrap_or(to);
                 let shade = ShadedRegion::vertical(self.t_s[row], until);
                 layout = layout.with_shaded_region(shade.with_color(SURFACE));
@@ -242,20 +276,23 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    fn drawn(count: usize) -> String {
+    fn drawn(count: usize, fingers: usize) -> String {
         let t_s: Vec<f64> = (0..count).map(|k| 0.02 * k as f64).collect();
         let wave = |hz: f64| -> Vec<f64> { t_s.iter().map(|t| 0.3 * (hz * t).sin()).collect() };
         let (requested, given, fixed) = (wave(0.7), wave(1.3), wave(2.1));
         let position_m: Vec<[f64; 3]> = t_s.iter().map(|t| [0.01 * t, 0.0, 0.05]).collect();
-        let plot = ReplayPlot {
-            title: "flat on a".to_owned(),
-            t_s: &t_s,
+        let finger = FingerCurves {
             position_m: &position_m,
             surface_m: &vec![0.05; count],
             inside: (0..count).map(|k| k % 50 < 40).collect(),
             requested_n: &requested,
             given_n: &given,
             static_n: &fixed,
+        };
+        let plot = ReplayPlot {
+            title: "flat on a".to_owned(),
+            t_s: &t_s,
+            fingers: vec![finger; fingers],
             coils: 2,
             current_a: &vec![0.7; 2 * count],
         };
@@ -265,13 +302,13 @@ mod tests {
     #[test]
     fn few_positions_and_many_are_drawn() {
         for count in [0, 1, 2, 300] {
-            let svg = drawn(count);
+            let svg = drawn(count, 1);
             assert!(
                 svg.ends_with("</svg>") && !svg.contains("NaN"),
                 "{count}: {svg}"
             );
         }
-        let svg = drawn(300);
+        let svg = drawn(300, 1);
         for label in [
             "t / s",
             "F / mN",
@@ -282,8 +319,10 @@ mod tests {
         ] {
             assert!(svg.contains(label), "{label}");
         }
-        assert!(svg == drawn(300), "not the same bytes twice");
-        let many = drawn(100_000).len();
+        assert!(svg == drawn(300, 1), "not the same bytes twice");
+        assert!(!svg.contains("second finger"));
+        assert!(drawn(300, 2).contains("second finger"));
+        let many = drawn(100_000, 1).len();
         assert!(many < 3_000_000, "{many} bytes");
     }
 

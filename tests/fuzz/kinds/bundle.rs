@@ -592,6 +592,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
             [last(&map.x_m), last(&map.y_m), last(&map.z_m)],
             [1.0, 1e300, -1.0],
         ],
+        ..Trajectory::default()
     };
     for dynamics in [false, true] {
         let report_text = TrajectorySource {

@@ -1,0 +1,164 @@
+//! Two fingers on one array: both get their force, whose magnets push each other too.
+
+use fluxform::bundle::replay::{Answer, FingerRows};
+use fluxform::bundle::trajectory::Trajectory;
+use fluxform::commands::replay::summary::TrajectorySource;
+use fluxform::commands::replay::{Opened, ReplayReport, run};
+use fluxform::design::{Design, Need};
+use fluxform::lambda::two_fingers::between_magnets_n;
+use fluxform::progress::Silent;
+use fluxform::scene::moment_a_m2;
+use fluxform_testing::Random;
+
+use crate::support::{both_ways, both_ways_along_the_normal};
+
+fn replayed(opened: &Opened, trajectory: &Trajectory) -> Result<ReplayReport, String> {
+    let source = TrajectorySource {
+        source: "a test".to_owned(),
+        input: None,
+        synthesis: None,
+    };
+    run(opened, trajectory, source, false, &Silent).map_err(|error| error.to_string())
+}
+
+/// Pairs 45 to 60 mm apart near the surface.
+fn pairs(count: usize) -> Trajectory {
+    let mut random = Random::new(29);
+    let mut trajectory = Trajectory::default();
+    for row in 0..count {
+        let half = 0.0225 + 0.0075 * random.unit();
+        let (sine, cosine) = (6.0 * random.unit()).sin_cos();
+        let mut finger = |sign: f64| {
+            let z = 0.048 + 0.003 * random.unit();
+            [sign * half * cosine, sign * half * sine, z]
+        };
+        trajectory.position_m.push(finger(1.0));
+        trajectory.second_m.push(finger(-1.0));
+        trajectory.t_s.push(0.01 * row as f64);
+    }
+    trajectory
+}
+
+fn moment(opened: &Opened) -> [f64; 3] {
+    let path = opened.bundle.folder.join("design.toml");
+    moment_a_m2(&Design::read(&path, Need::SWEEP).unwrap().0)
+}
+
+fn wanted(rows: &FingerRows, row: usize) -> [f64; 3] {
+    let [x, y] = rows.wanted_sideways_n.get(row).copied().unwrap_or_default();
+    [x, y, rows.wanted_force_n[row]]
+}
+
+#[test]
+fn both_get_their_force_from_coils_and_from_the_other_s_magnet() {
+    for (opened, axes) in [
+        (both_ways().open("flat"), 2..3),
+        (both_ways_along_the_normal().open("flat"), 0..3),
+    ] {
+        let trajectory = pairs(300);
+        let report = replayed(&opened, &trajectory).unwrap();
+        let (rows, moment) = (&report.rows, moment(&opened));
+        let fingers: Vec<&FingerRows> = rows.fingers().collect();
+        let mut per_ampere = vec![[0.0; 3]; rows.coils];
+        let mut upward = vec![0.0; rows.coils];
+        let mut both = 0;
+        for row in 0..rows.len() {
+            let apart: [f64; 3] = std::array::from_fn(|axis| {
+                trajectory.second_m[row][axis] - trajectory.position_m[row][axis]
+            });
+            let on_second = between_magnets_n(moment, apart);
+            if fingers
+                .iter()
+                .all(|finger| finger.answer[row] == Answer::Ok)
+            {
+                both += 1;
+            }
+            for (finger, sign) in fingers.iter().zip([-1.0, 1.0]) {
+                // By the bundle's own lookup, not by the loop's.
+                let at = finger.position_m[row];
+                if axes.start == 2 {
+                    opened.bundle.force_per_ampere(at, &mut upward);
+                    let parts = per_ampere.iter_mut().zip(&upward);
+                    parts.for_each(|(vector, force)| vector[2] = *force);
+                } else {
+                    opened.bundle.force_vector_per_ampere(at, &mut per_ampere);
+                }
+                let request = wanted(finger, row);
+                let scale = 1e-3 * request[2].abs().max(0.01);
+                for axis in axes.clone() {
+                    let terms = per_ampere.iter().zip(rows.currents_a(row));
+                    let coils: f64 = terms.map(|(force, current)| force[axis] * current).sum();
+                    let force = coils + sign * on_second[axis];
+                    if axis == 2 {
+                        assert!((force - finger.force_n[row]).abs() < 1e-12);
+                    } else {
+                        assert!((force - finger.sideways_n[row][axis]).abs() < 1e-12);
+                    }
+                    let error = (force - request[axis]).abs();
+                    assert!(
+                        finger.answer[row] != Answer::Ok || error < scale,
+                        "{row}: {error}"
+                    );
+                }
+            }
+        }
+        let share = f64::from(both) / 300.0;
+        let two = report.summary.two_fingers.as_ref().unwrap();
+        assert!(
+            (two.both_given_time_fraction - share).abs() < 1e-9 && share > 0.0,
+            "{axes:?} {share} of {}",
+            two.both_given_time_fraction
+        );
+        assert!(two.magnets_force_n > 0.0);
+    }
+}
+
+#[test]
+fn neither_is_the_first_and_one_outside_counts_for_nothing() {
+    let opened = both_ways().open("flat");
+    let trajectory = pairs(40);
+    let swapped = Trajectory {
+        position_m: trajectory.second_m.clone(),
+        second_m: trajectory.position_m.clone(),
+        t_s: trajectory.t_s.clone(),
+    };
+    let one = replayed(&opened, &trajectory).unwrap().rows;
+    let other = replayed(&opened, &swapped).unwrap().rows;
+    for (a, b) in one.current_a.iter().zip(&other.current_a) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    for (a, b) in one.first.force_n.iter().zip(&other.second.unwrap().force_n) {
+        assert!((a - b).abs() < 1e-9);
+    }
+    let alone = Trajectory {
+        second_m: Vec::new(),
+        ..trajectory.clone()
+    };
+    let alone = replayed(&opened, &alone).unwrap().rows;
+    let beside = Trajectory {
+        second_m: vec![[0.3, 0.0, 0.05]; trajectory.len()],
+        ..trajectory
+    };
+    let beside = replayed(&opened, &beside).unwrap().rows;
+    assert_eq!(beside.second.as_ref().unwrap().answer[0], Answer::Outside);
+    for (row, answer) in alone.first.answer.iter().enumerate() {
+        if *answer == Answer::Ok {
+            let pairs = alone.currents_a(row).iter().zip(beside.currents_a(row));
+            let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-5, "{row}: {apart}");
+        }
+    }
+}
+
+#[test]
+fn magnets_that_overlap_are_refused_with_their_time() {
+    let opened = both_ways().open("flat");
+    let mut trajectory = pairs(3);
+    trajectory.second_m[1] = trajectory.position_m[1].map(|part| part + 1e-3);
+    let message = replayed(&opened, &trajectory).unwrap_err();
+    assert!(
+        message
+            .contains("at 0.01 s the two fingers are 1.414 mm apart sideways and 1 mm in height"),
+        "{message}"
+    );
+}
