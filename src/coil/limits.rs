@@ -39,7 +39,7 @@ pub enum LimitName {
     ArrayPower,
     /// Mass of all coils and cores, kg.
     ArrayMass,
-    /// Five time constants of the slowest coil among its neighbours, s.
+    /// Five time constants of the slowest pattern of currents in the array, s.
     ArraySettling,
     /// Turns over turns that fit; always holds.
     WindingFill,
@@ -118,7 +118,7 @@ pub struct Evaluated<'a> {
     pub mass_kg: f64,
     /// Flux density in the core where there is one, T.
     pub core_field_t: Option<f64>,
-    /// Largest self inductance of a coil among its neighbours, H, where that is known.
+    /// Inductance of the slowest pattern of currents in the array, H, where that is known.
     pub array_inductance_h: Option<f64>,
 }
 

@@ -14,6 +14,7 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::ring::{RingPoint, ring_field};
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
+use nalgebra::DMatrix;
 
 /// Relative error of [`mutual_inductance_h`] for gaps of at least a tenth of the outer radius.
 pub const RELATIVE_ERROR: f64 = 1e-6;
@@ -165,6 +166,15 @@ pub fn estimated_matrix_h(
     (matrix, worst)
 }
 
+/// The inductance of the slowest pattern of currents, H: the largest eigenvalue of an inductance
+/// matrix. Over R it is the longest time constant of equal coils, which that of none alone is.
+#[must_use]
+pub fn slowest_inductance_h(matrix_h: &[Vec<f64>]) -> f64 {
+    let entry = |i: usize, j: usize| 0.5 * (matrix_h[i][j] + matrix_h[j][i]);
+    let matrix = DMatrix::from_fn(matrix_h.len(), matrix_h.len(), entry);
+    matrix.symmetric_eigenvalues().max()
+}
+
 fn matrix_of(
     self_h: f64,
     axes_m: &[[f64; 2]],
@@ -199,6 +209,15 @@ fn matrix_of(
 mod tests {
     use super::*;
     use fluxform_numerics::random::Random;
+
+    #[test]
+    fn regression_a_pattern_of_currents_is_slower_than_any_coil() {
+        // Equal and opposite currents of two coils, and all three alike of a triangle.
+        assert!((slowest_inductance_h(&[vec![3.0, -0.7], vec![-0.7, 3.0]]) - 3.7).abs() < 1e-12);
+        let triangle = [[2.0, 0.3, 0.3], [0.3, 2.0, 0.3], [0.3, 0.3, 2.0]].map(Vec::from);
+        assert!((slowest_inductance_h(&triangle) - 2.6).abs() < 1e-12);
+        assert!((slowest_inductance_h(&[vec![1.7]]) - 1.7).abs() < 1e-15);
+    }
 
     #[test]
     fn far_apart_the_coils_are_dipoles() {

@@ -185,7 +185,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.array_mass_max_kg", "mass of all coils and cores"),
     (
         "limits.array_settling_max_ms",
-        "five time constants of the slowest coil among its neighbours",
+        "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`",
     ),
     (
         "cooling.surface_w_per_m2_k",

@@ -31,7 +31,7 @@ pub struct Limits {
     pub array_power_max_w: Option<f64>,
     /// Mass of all coils with their cores, kg.
     pub array_mass_max_kg: Option<f64>,
-    /// Five time constants of the slowest coil among its neighbours, s.
+    /// Five time constants of the slowest pattern of currents in the array, s.
     pub array_settling_max_s: Option<f64>,
 }
 

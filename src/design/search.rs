@@ -110,6 +110,12 @@ impl SearchSpace {
             .find(|(known, _)| *known == key)
             .map(|(_, values)| values)
     }
+
+    /// Whether a coil alone, its wire or its core differs between the designs.
+    #[must_use]
+    pub fn changes_coil(&self) -> bool {
+        self.without_core || self.keys.iter().any(|(key, _)| key.is_of_coil())
+    }
 }
 
 const COUNT: Rule = Rule::any("").bound(Bound::AtLeast(1.0));
@@ -215,6 +221,20 @@ pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
 const MAGNETS_MAX: usize = 100;
 
 impl SearchKey {
+    /// Whether it is one of a coil alone.
+    fn is_of_coil(self) -> bool {
+        match self {
+            Self::InnerDiameter
+            | Self::OuterDiameter
+            | Self::Length
+            | Self::Wire
+            | Self::Clearance
+            | Self::Above
+            | Self::Below => true,
+            Self::Pitch | Self::Rows | Self::Columns | Self::Move | Self::Height => false,
+        }
+    }
+
     /// Whether two values are two choices, not the ends of a range.
     fn is_listed(self) -> bool {
         match self {

@@ -35,6 +35,14 @@ impl Template {
         self.table
     }
 
+    /// The value of a dotted key.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        let mut parts = key.split('.');
+        let first = self.table.get(parts.next()?)?;
+        parts.try_fold(first, |value, part| value.get(part))
+    }
+
     /// Takes a dotted key out, where it is there.
     pub fn remove(&mut self, key: &str) {
         let mut here = &mut self.table;

@@ -11,7 +11,8 @@ use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
-use crate::coil::mutual;
+use crate::coil::circuit::Circuit;
+use crate::coil::mutual::{self, slowest_inductance_h};
 use crate::field::components::Components;
 use crate::field::iron::array::IronPeaks;
 use crate::field::steel::core_flux_density::peak_depth_m;
@@ -24,6 +25,10 @@ pub struct ArraySummary {
     /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j. With
     /// a B-H curve that of the linear array whose permeability is `relative_permeability`.
     pub mutual_inductance_h: Vec<Vec<f64>>,
+    /// The inductance of the slowest pattern of currents, H: the largest eigenvalue of the matrix.
+    pub slowest_inductance_h: f64,
+    /// Five time constants of that pattern, s.
+    pub settling_s: f64,
     /// With a B-H curve: permeability of the array's linear solution, that of one coil alone at
     /// the mean |B| of its rated current.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,13 +53,13 @@ pub struct IronSummary {
     pub peak_at_m: [f64; 3],
     /// Flux density above which their steel is no longer linear, T.
     pub knee_t: f64,
-    /// Five time constants of the slowest coil among all steel, s.
+    /// [`ArraySummary::settling_s`].
     pub settling_s: f64,
 }
 
 fn iron_summary(
     scene: &Scene,
-    matrix: &[Vec<f64>],
+    settling_s: f64,
     peaks: &IronPeaks,
     warnings: &mut Vec<String>,
 ) -> Option<IronSummary> {
@@ -67,13 +72,8 @@ fn iron_summary(
         peak_field_t: peaks.elsewhere.0,
         peak_at_m: peaks.elsewhere.1,
         knee_t: iron.knee_t,
-        settling_s: settling_s(scene, matrix),
+        settling_s,
     })
-}
-
-fn settling_s(scene: &Scene, matrix: &[Vec<f64>]) -> f64 {
-    let own = matrix.iter().enumerate().map(|(coil, row)| row[coil]);
-    5.0 * own.fold(0.0, f64::max) / scene.circuit.resistance_ohm
 }
 
 /// All coils at their rated currents, along the B-H curve.
@@ -126,6 +126,10 @@ pub(crate) fn array(
     let air = in_air.0.clone();
     let (matrix, stage) = inductances(&solved, in_air);
     let accuracy_missed = missed([(&"mutual_inductance", &stage)], tolerance);
+    let slowest = Circuit {
+        inductance_h: slowest_inductance_h(&matrix),
+        ..scene.circuit
+    };
     accuracy.insert("mutual_inductance", stage);
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
     let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, lowest_m)? {
@@ -153,7 +157,7 @@ pub(crate) fn array(
     let iron = solved.iron_peaks(scene, &scene.upper_a)?;
     let iron = iron.and_then(|peaks| {
         peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
-        iron_summary(scene, &matrix, &peaks, warnings)
+        iron_summary(scene, slowest.settling_s(), &peaks, warnings)
     });
     let coils = axes
         .iter()
@@ -171,6 +175,8 @@ pub(crate) fn array(
     Ok(Some(ArraySummary {
         coils,
         mutual_inductance_h: matrix,
+        slowest_inductance_h: slowest.inductance_h,
+        settling_s: slowest.settling_s(),
         relative_permeability: working_point
             .is_some()
             .then_some(solved.relative_permeability),

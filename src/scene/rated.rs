@@ -120,8 +120,8 @@ impl Rated {
         Ok(rated)
     }
 
-    /// Checks the design's limits; `array_inductance_h` is the largest self inductance among the
-    /// neighbours, where that is known.
+    /// Checks the design's limits; `array_inductance_h` is that of the array's slowest pattern
+    /// of currents, where that is known.
     pub(crate) fn check_limits(&mut self, scene: &Scene, array_inductance_h: Option<f64>) {
         let summary = &self.coil.circuit;
         self.limits = limits::check(&Evaluated {

@@ -43,6 +43,17 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     for limit in result["limits"].as_object().unwrap().values() {
         assert_eq!(limit["met"], true, "{limit}");
     }
+    let history = result["history"].as_array().unwrap();
+    let grows = |pair: &[Value]| {
+        number(&pair[0], "gain") < number(&pair[1], "gain")
+            && number(&pair[0], "evaluations") < number(&pair[1], "evaluations")
+    };
+    assert!(!history.is_empty() && history.windows(2).all(grows));
+    let last = number(history.last().unwrap(), "gain");
+    assert!(
+        (last / number(&result, "gain") - 1.0).abs() < 1e-2,
+        "{last}"
+    );
     let best = place
         .run(&["evaluate", "best.toml", "--strict", "--format", "json"])
         .ends(0)
@@ -58,6 +69,50 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     place
         .run(&["calibrate", "best.toml", FLAT, "--no-report"])
         .ends(0);
+}
+
+/// Two cored coils: the pattern of opposite currents settles more slowly than a coil alone.
+#[test]
+fn regression_the_settling_limit_held_for_a_coil_alone() {
+    let place = Place::new();
+    let text = place.text("designs/seed.toml");
+    let text = text
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2")
+        .replace("pitch_mm = 50.0", "pitch_mm = 39.0");
+    place.write("two.toml", &text);
+    let mut arguments = vec!["optimize", "two.toml", "--for", FLAT];
+    arguments.extend(["--vary", "coil.length_mm=30:100", "--vary"]);
+    arguments.extend(["coil.inner_diameter_mm=10:30", "--evaluations", "40"]);
+    arguments.extend(["--starts", "1", "--out", "best.toml", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    let best = place
+        .run(&["evaluate", "best.toml", "--strict", "--format", "json"])
+        .ends(0)
+        .json();
+    let henry = |j: usize| best["array"]["mutual_inductance_h"][0][j].as_f64().unwrap();
+    let settled = 5.0 * (henry(0) + henry(1).abs()) / number(&best, "coil/resistance_ohm");
+    assert!((number(&best, "array/settling_s") / settled - 1.0).abs() < 1e-9);
+    assert!(settled < 0.1 && settled > 0.09, "{settled}");
+    assert!((number(&best, "limits/array_settling_s/value") / settled - 1.0).abs() < 1e-9);
+    assert!(number(&best, "coil/settling_s") < settled, "{best}");
+    assert_eq!(result["limits"]["array_settling_s"]["limit"], 0.1);
+}
+
+/// Nothing that is searched lets a coil settle in time: its limit is not asked of the array either.
+#[test]
+fn a_settling_limit_that_the_given_coil_misses_does_not_fail_a_search_of_the_pitch() {
+    let place = Place::new();
+    let text = place.text("designs/seed.toml");
+    let text = text
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    place.write("two.toml", &text);
+    let mut arguments = vec!["optimize", "two.toml", "--for", FLAT];
+    arguments.extend(["--vary", "array.pitch_mm=39:60", "--starts", "1"]);
+    arguments.extend(["--evaluations", "12", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    assert!(result["limits"]["array_settling_s"].is_null());
 }
 
 /// A known answer: the pitch alone against a fine scan.
@@ -140,6 +195,20 @@ fn mirrored_shapes_give_mirrored_arrays() {
     let ((one, moves), (other, mirrored)) = (gain("shapes/wedge.toml"), gain("mirrored.toml"));
     assert!((one / other - 1.0).abs() < 2e-3, "{one} {other}");
     assert!(moves.iter().chain(&mirrored).all(|x| x.abs() <= 12.0));
+}
+
+/// The picture states what limits are worth, and is what its ending says.
+#[test]
+fn regression_a_png_of_the_trade_offs_held_svg() {
+    let place = Place::new();
+    let drawn = |file: &str| {
+        place.run(&search(&["--plot", file])).ends(0);
+        place.read(file)
+    };
+    assert!(drawn("front.png").starts_with(b"\x89PNG"));
+    let svg = String::from_utf8(drawn("front.svg")).expect("text");
+    assert!(svg.contains("ohm more of resistance would give"), "{svg}");
+    place.run(&search(&["--plot", "front.jpeg"])).ends(2);
 }
 
 #[test]

@@ -85,6 +85,11 @@ pub const COMMANDS: &[Writes] = &[
         "optimize",
         "optimize air.toml --out out/best.toml --report out/best.html",
     ),
+    writes(
+        "optimize --for",
+        "optimize air.toml --for bump.toml --vary coil.inner_diameter_mm=10:30 --evaluations 12 --starts 1 --out \
+         out/best.toml --front out/trade.csv --plot out/trade.svg --journal out/journal.json",
+    ),
     Writes {
         earlier: "--components gz",
         ..writes("probe", "probe air.toml places.csv --out out/probe.csv")

@@ -31,7 +31,7 @@ pub struct Physical {
     pub lambda_n_per_m: Vec<f64>,
     /// Self inductance of a coil alone, H.
     pub inductance_h: f64,
-    /// The largest among its neighbours, H.
+    /// That of the array's slowest pattern of currents, H.
     pub array_inductance_h: f64,
     /// Flux density in the core at the rated current, T.
     pub core_field_t: Option<f64>,
@@ -255,8 +255,12 @@ impl<'a> ArrayProblem<'a> {
     /// Interruption.
     pub fn physical(&self, x: &[f64], level: Level) -> Result<Option<Physical>, Interrupted> {
         let made = self.space.made(x);
+        let design = self.space.design(&made);
+        if !is_solid(&design) {
+            return Ok(None);
+        }
         self.physics
-            .compute(&self.space.design(&made), self.space.raised_m(&made), level)
+            .compute(&design, self.space.raised_m(&made), level)
     }
 
     /// What the corrected outputs stand for.
@@ -427,6 +431,20 @@ impl<'a> ArrayProblem<'a> {
     pub fn index(&self, axis: Axis) -> Option<usize> {
         self.space.axes().iter().position(|known| *known == axis)
     }
+}
+
+/// Whether the core has a size and is clear of the neighbours' windings: steel that turns inside out or
+/// crosses other steel has no field.
+fn is_solid(design: &Design) -> bool {
+    let (Some(coil), Some(core)) = (&design.coil, &design.core) else {
+        return true;
+    };
+    let least_m = 0.5 * LEAST_CORE_MM * 1e-3;
+    let diameter_m = coil.inner_diameter_m - 2.0 * core.clearance_m;
+    let apart_m = closest(&design.array.positions_m);
+    diameter_m > least_m
+        && coil.length_m + core.above_m + core.below_m > least_m
+        && 0.5 * (coil.outer_diameter_m + diameter_m) < apart_m
 }
 
 impl Problem for ArrayProblem<'_> {

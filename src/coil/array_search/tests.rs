@@ -143,6 +143,40 @@ fn the_study_holds_against_what_it_says() {
     );
 }
 
+/// Counts nothing, but refuses a core whose ends or sides have changed places.
+struct NoCoreInsideOut;
+
+impl Physics for NoCoreInsideOut {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        if let (Some(coil), Some(core)) = (&design.coil, &design.core) {
+            assert!(
+                coil.length_m + core.above_m + core.below_m > 0.0,
+                "{design:?}"
+            );
+            assert!(coil.inner_diameter_m > 2.0 * core.clearance_m, "{design:?}");
+        }
+        OnAxis.compute(design, raised_m, level)
+    }
+}
+
+#[test]
+fn regression_a_core_turned_inside_out_took_all_memory() {
+    let search = "[core]\nabove_mm = 0.0\nbelow_mm = 0.0\nclearance_mm = 0.0\nrelative_permeability = 1000.0\n\
+                  [search]\ncoil.inner_diameter_mm = [3.0, 30.0]\ncoil.length_mm = [10.0, 100.0]\n\
+                  core.above_mm = [-200.0, 5.0]\ncore.below_mm = [-200.0, 5.0]\ncore.clearance_mm = [0.0, 9.0]\n";
+    let design = design(search);
+    let all = problems(&design, &request(), &[1.0], &NoCoreInsideOut).expect("a search");
+    let found = run(&all, &design, request().settings)
+        .expect("not interrupted")
+        .expect("a design");
+    assert!(found.best.is_feasible(), "{:?}", found.best.bounds);
+}
+
 #[test]
 fn limits_that_no_design_meets_are_named_before_anything_is_computed() {
     let text = ONE_COIL.replace("[5.0, 38.0]", "[45.0, 60.0]");

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::recorded;
 use crate::bundle::write::BundleContent;
 use crate::coil::limits::{self, Evaluated, LimitCheck};
+use crate::coil::mutual::slowest_inductance_h;
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
 use crate::scene::Scene;
@@ -48,9 +49,11 @@ fn limit_checks(
     content: &BundleContent,
 ) -> (BTreeMap<&'static str, LimitCheck>, Vec<&'static str>) {
     let mut circuit = scene.circuit;
+    let mut array_inductance_h = circuit.inductance_h;
     if let Some(array) = &content.manifest.circuit {
         let own = array.inductance_h.iter().enumerate().map(|(i, row)| row[i]);
         circuit.inductance_h = own.fold(0.0, f64::max);
+        array_inductance_h = slowest_inductance_h(&array.inductance_h);
     }
     let steel_kg = scene
         .core
@@ -64,7 +67,7 @@ fn limit_checks(
         power_w: circuit.power_w(scene.rated_current_a()),
         mass_kg: circuit.wire_mass_kg + steel_kg,
         core_field_t: peak_t,
-        array_inductance_h: Some(circuit.inductance_h),
+        array_inductance_h: Some(array_inductance_h),
     });
     let limited = scene.design.limits.core_field_max_t.is_some() && scene.core.is_some();
     let unchecked = (limited && peak_t.is_none()).then_some("core field");

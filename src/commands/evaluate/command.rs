@@ -161,10 +161,12 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         sheet.line(
             "array",
             &format!(
-                "{}; largest mutual inductance {} ({} of a coil's own)",
+                "{}; largest mutual inductance {} ({} of a coil's own)\n\
+                 the slowest pattern of currents settles after {}",
                 describe::array(design),
                 si(largest, "H"),
-                percent(largest / circuit.inductance_h)
+                percent(largest / circuit.inductance_h),
+                si(array.settling_s, "s")
             ),
         );
         if let Some(point) = &array.working_point {

@@ -222,6 +222,11 @@ impl<'a> Search<'a> {
         best
     }
 
+    /// Designs that have outputs.
+    fn known(&self) -> usize {
+        self.samples.iter().filter(|s| s.outputs.is_some()).count()
+    }
+
     fn spent(&self) -> bool {
         self.samples.len() >= self.settings.evaluations
     }
@@ -254,7 +259,14 @@ impl<'a> Search<'a> {
         while width > self.settings.finest && !self.spent() {
             let at = self.units(&self.samples[center].x);
             let Some(surrogate) = self.surrogate() else {
-                break;
+                // Too few designs have outputs: those near one that has are tried first.
+                let known = self.known();
+                let near = self.scattered(&at, width, BATCH);
+                self.evaluate(near)?;
+                if self.known() == known {
+                    width *= NARROWER;
+                }
+                continue;
             };
             let now = self
                 .judged(&self.samples[center])

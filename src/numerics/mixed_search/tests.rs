@@ -77,6 +77,31 @@ fn coil() -> impl Problem {
     }
 }
 
+/// Outputs exist only close to the given design, as where a shape is out of most arrays' reach.
+#[test]
+fn regression_a_search_ended_where_few_designs_have_outputs() {
+    let best = [0.93, 0.07, 0.31, 0.62, 0.48];
+    let problem = Closed {
+        variables: vec![variable(0.0, 1.0, Values::Continuous); 5],
+        outputs: |x: &[f64]| {
+            let off = |(x, best): (&f64, f64)| (x - best) * (x - best);
+            let far: f64 = x.iter().zip(best).map(off).sum();
+            (far < 0.03).then(|| vec![-far])
+        },
+        judge: |_: &[f64], outputs: &[f64]| Judged {
+            objectives: vec![outputs.first().copied().unwrap_or(0.0)],
+            limits: Vec::new(),
+        },
+        calls: AtomicUsize::new(0),
+    };
+    let mut search = Search::new(&problem, Settings::default());
+    search
+        .run(&[vec![0.85, 0.13, 0.38, 0.56, 0.42]])
+        .expect("not interrupted");
+    let (_, judged) = search.best().expect("a design");
+    assert!(judged.objective() > -1e-4, "{}", judged.objective());
+}
+
 /// The best of all whole values, the two others by a grid that is refined.
 fn exhaustive(problem: &dyn Problem) -> f64 {
     let mut best = f64::NEG_INFINITY;

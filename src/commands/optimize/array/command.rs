@@ -21,6 +21,8 @@ use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Progress};
+use crate::scene::Scene;
+use crate::scene::rated::Rated;
 
 /// An array for shapes instead of a coil.
 #[derive(Debug, Args)]
@@ -51,8 +53,8 @@ pub struct ArrayFlags {
     /// Write the trade-offs against mass, heat and settling here (CSV)
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
-    /// Draw them here (SVG, PNG or PDF)
-    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
+    /// Draw them here, with what limits are worth (SVG, PNG or PDF)
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes", value_parser = values::picture)]
     pub plot: Option<FileArgument>,
     /// Keep every array that is computed in this file, and take from it those of an earlier run
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
@@ -94,8 +96,13 @@ impl ArrayFlags {
         )?;
         let path = shared.design.as_given();
         let text = self.varied(&document.text, path)?;
-        let (design, _) = Design::from_toml(&text, path, Need::CALIBRATE)
-            .map_err(|fault| Failure::Documents(vec![fault]))?;
+        let read = |text: &str| {
+            let read = Design::from_toml(text, path, Need::CALIBRATE);
+            read.map_err(|fault| Failure::Documents(vec![fault]))
+        };
+        let (mut design, _) = read(&text)?;
+        let text = settling_in_array(text, path, &design, shared.tolerance)?;
+        (design, _) = read(&text)?;
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
         let mark = mark(shared.design, &document.text);
@@ -165,8 +172,9 @@ impl ArrayFlags {
             &of_table,
             printer,
         )?;
-        let drawn = match (&plot, tables::svg(&result)) {
-            (Some(plot), Some(svg)) => plot.write(&result.inputs, &svg, printer)?,
+        let worths = result.study.as_ref().map_or_else(Vec::new, text::worths);
+        let drawn = match (&plot, tables::drawing(&result, &worths)) {
+            (Some(plot), Some(drawing)) => plot.draw(&result.inputs, &drawing, printer)?,
             _ => Stream::Output,
         };
         if [front, drawn].contains(&Stream::Error) {
@@ -269,6 +277,33 @@ impl ArrayFlags {
         let file = self.journal.as_ref();
         written_to(file, &format!("{mark}\n{text}\n"), overwrite, printer).map(|_| ())
     }
+}
+
+/// The text with the limit on a coil's settling as one on the array's too, unless it has its own or
+/// no array that is searched could meet it: the coil misses it and nothing changes the coil.
+fn settling_in_array(
+    text: String,
+    path: &std::path::Path,
+    design: &Design,
+    tolerance: Option<f64>,
+) -> Result<String, Failure> {
+    let key = "limits.array_settling_max_ms";
+    let template = Template::new(&text, path).map_err(|fault| Failure::Documents(vec![fault]))?;
+    let of_coil = template.get("limits.settling_max_ms").cloned();
+    let (Some(settling), None) = (of_coil, template.get(key)) else {
+        return Ok(text);
+    };
+    if !design.search.changes_coil() {
+        let alone = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
+        if alone
+            .limits
+            .get("settling_s")
+            .is_some_and(|check| !check.met)
+        {
+            return Ok(text);
+        }
+    }
+    template.with([(key, settling)]).map_err(Failure::Usage)
 }
 
 /// `KEY=FROM:TO` or `KEY=A,B,C` as a key of `[search]` and its value.

@@ -20,7 +20,7 @@ use crate::coil::array_search::study::{Study, study};
 use crate::commands::evaluate::evaluate;
 use crate::design::template::Template;
 use crate::design::{Design, Need};
-use crate::numerics::mixed_search::Settings;
+use crate::numerics::mixed_search::{MET, Settings};
 use crate::progress::{Interrupted, Progress};
 use crate::scene::Scene;
 use crate::scene::sources::ShapeSource;
@@ -216,11 +216,29 @@ fn result(
         },
         levels: levels(physics, document.design, (before, found))?,
         evaluations: found.evaluations,
+        history: history(found),
         choices: found.choices,
         seed: request.settings.seed,
         design_text,
         warnings,
     })
+}
+
+/// The gains that were larger than all before them, of arrays that meet every limit.
+fn history(found: &Found<'_>) -> Vec<Improvement> {
+    let mut grown: Vec<Improvement> = Vec::new();
+    for (index, sample) in found.search.samples().iter().enumerate() {
+        let judged = found.search.judged(sample);
+        let Some(judged) = judged.filter(|judged| judged.excess() <= MET) else {
+            continue;
+        };
+        let gain = judged.objective().exp();
+        if grown.last().is_none_or(|last| gain > last.gain) {
+            let evaluations = index + 1;
+            grown.push(Improvement { evaluations, gain });
+        }
+    }
+    grown
 }
 
 /// One number of the shapes' ratios.

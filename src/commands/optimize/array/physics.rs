@@ -10,6 +10,7 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::coil::array_search::problem::{Level, Physical, Physics};
+use crate::coil::mutual::slowest_inductance_h;
 use crate::commands::discretize;
 use crate::commands::lambda::WantedPoints;
 use crate::design::Design;
@@ -21,7 +22,7 @@ use crate::point_weights::Weights;
 use crate::progress::{Interrupted, Progress, Silent, interruptible};
 use crate::scene::single::Single;
 use crate::scene::sources::ShapeSource;
-use crate::scene::{Scene, passive, steel};
+use crate::scene::{Scene, neighbours, passive, steel};
 
 /// The force constant that is made as large as possible.
 #[derive(
@@ -240,16 +241,12 @@ impl<'a> ArrayPhysics<'a> {
             }
         }
         let (inductance_h, core_field_t) = Single::essentials(&scene)?;
-        let added = |coil: usize| solved.steel().added_inductance_h(coil, coil);
-        let of_array = (0..coils).map(|coil| scene.circuit.inductance_h + added(coil));
-        let array_inductance_h = match crate::scene::coupled(design) {
-            true => of_array.fold(0.0, f64::max),
-            false => inductance_h,
-        };
+        let in_air = neighbours::in_air(&scene, scene.tolerances.inductances);
+        let (matrix, _) = neighbours::inductances(&solved, in_air);
         Ok(Some(Physical {
             lambda_n_per_m,
             inductance_h,
-            array_inductance_h,
+            array_inductance_h: slowest_inductance_h(&matrix),
             core_field_t,
         }))
     }

@@ -47,6 +47,9 @@ pub struct ArrayOptimization {
     pub levels: Vec<LevelSummary>,
     /// Arrays that were computed.
     pub evaluations: usize,
+    /// The best gain so far by the number of arrays computed, each time it grew, at the accuracy of the
+    /// search and of the choice that was best.
+    pub history: Vec<Improvement>,
     /// Choices of layout, magnet and core that were searched.
     pub choices: usize,
     /// Where the sequence of designs begins.
@@ -57,6 +60,15 @@ pub struct ArrayOptimization {
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+/// A gain that was larger than all before it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Improvement {
+    /// Arrays computed until then.
+    pub evaluations: usize,
+    /// The gain.
+    pub gain: f64,
 }
 
 /// How a search of arrays ended.

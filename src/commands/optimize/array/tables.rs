@@ -3,10 +3,14 @@
 use super::ArrayOptimization;
 use crate::coil::array_search::study::TRADED;
 use crate::coil::limits::LimitName;
+use crate::plot::drawing::Drawing;
 use crate::plot::pareto::{Panel, ParetoPlot};
 
 /// How the table begins.
 pub const HEAD: &str = "quantity,value,gain";
+
+/// Worths of limits that fit above the panels.
+const WORTHS: usize = 2;
 
 /// One row a point: quantity, its value, the gain, and every variable.
 pub fn csv(result: &ArrayOptimization) -> String {
@@ -32,8 +36,9 @@ pub fn csv(result: &ArrayOptimization) -> String {
     text
 }
 
-/// Gain against mass, heat and settling of the whole array; `None` where these were not studied.
-pub fn svg(result: &ArrayOptimization) -> Option<String> {
+/// Gain against mass, heat and settling of the whole array, and above them the `worths` of limits; `None`
+/// where these were not studied.
+pub fn drawing(result: &ArrayOptimization, worths: &[String]) -> Option<Drawing> {
     let study = result.study.as_ref()?;
     let panel = |cost: usize| {
         let (_, name): (_, LimitName) = TRADED[cost];
@@ -50,7 +55,10 @@ pub fn svg(result: &ArrayOptimization) -> Option<String> {
         }
     };
     let plot = ParetoPlot {
-        title: format!("{}: force constants against their cost", result.design),
+        title: std::iter::once(format!("{}: gain against cost", result.design))
+            .chain(worths.iter().take(WORTHS).cloned())
+            .collect::<Vec<_>>()
+            .join("; "),
         gain: "force constants, relative",
         gain_unit: "",
         gains: study
@@ -62,5 +70,5 @@ pub fn svg(result: &ArrayOptimization) -> Option<String> {
         front: "computed arrays that no other one beats",
         panels: std::array::from_fn(panel),
     };
-    Some(plot.drawing().svg())
+    Some(plot.drawing())
 }

@@ -73,13 +73,14 @@ fn ended(result: &ArrayOptimization) -> String {
     }
 }
 
+/// What a step more of each limit that binds would give.
+pub fn worths(study: &Study) -> Vec<String> {
+    let active = study.limits.iter().filter(|limit| limit.active);
+    active.map(one_more).collect()
+}
+
 fn worth(sheet: &mut Sheet, study: &Study) {
-    let said: Vec<String> = study
-        .limits
-        .iter()
-        .filter(|limit| limit.active)
-        .map(one_more)
-        .collect();
+    let said = worths(study);
     if !said.is_empty() {
         sheet.line("worth", &said.join("\n"));
     }
