@@ -6,6 +6,7 @@
 //! [`Bundle::force_per_ampere`] up to rounding. Nothing is allocated after [`ForceMap::new`].
 
 use super::load::Bundle;
+use super::npz::MapArrays;
 use fluxform_numerics::lagrange::{ORDER_NODES, stencil};
 
 /// Coils summed together.
@@ -34,7 +35,12 @@ impl ForceMap {
     /// Arranges the map of `bundle`.
     #[must_use]
     pub fn new(bundle: &Bundle) -> Self {
-        let map = &bundle.map;
+        Self::of_map(&bundle.map)
+    }
+
+    /// Arranges `map`.
+    #[must_use]
+    pub fn of_map(map: &MapArrays) -> Self {
         let [kept, nz, ny, nx] = map.shape();
         let nodes = nz * ny * nx;
         let [m_x, m_y, m_z] = map.runtime.moment_a_m2;
@@ -65,7 +71,7 @@ impl ForceMap {
         let size = |most: f64, value: &f64| most.max(value.abs());
         Self {
             axes_m: [&map.x_m, &map.y_m, &map.z_m].map(|axis| axis.to_vec()),
-            coils: bundle.coil_count(),
+            coils: map.runtime.current_max_a.len(),
             kept: map.coil.iter().map(|&coil| coil as usize).collect(),
             largest_n_per_a: force_n_per_a
                 .chunks(plane)

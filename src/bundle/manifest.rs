@@ -103,6 +103,9 @@ pub struct MadeWith {
     pub reach_m: f64,
     /// Whether `report.html` and `plots/` were requested.
     pub report: bool,
+    /// Whether `vtk/` was requested; absent without it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub vtk: bool,
     /// Platform and instructions: with others the last bits of the numbers differ.
     pub arithmetic: String,
     /// Unit, placement and grid of a surface that was given directly, without a shape file.

@@ -19,7 +19,7 @@ use super::npz::{MapArrays, to_npz};
 use super::seal::to_record;
 use super::table::{CurrentRow, PointRow, write_rows};
 use super::timing::StageSeconds;
-use super::vtk::write_vti;
+use super::vtk::write_map_image;
 
 /// Everything a bundle holds but its timing.
 #[derive(Debug, Clone)]
@@ -313,7 +313,7 @@ pub fn write_map_and(
         put(&mut set, "map.csv", &|out| write_map(out, map))?;
     }
     if formats.vtk {
-        put(&mut set, "map.vti", &|out| write_vti(out, map))?;
+        put(&mut set, "map.vti", &|out| write_map_image(out, map))?;
     }
     for beside in beside_paths {
         check_beside(beside.path, folder)?;

@@ -15,6 +15,7 @@ use crate::field::steel::equivalent_dipoles::ArraySources;
 use crate::field::steel::saturated::Convergence;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::saturated_coil::SaturatedCoil;
+use crate::map::FieldMap;
 use crate::map::coupled_map::SampledField;
 use crate::map::map_source::Sampler;
 use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
@@ -218,40 +219,51 @@ impl WorkingPoint {
         grid: &Grid,
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
+        let pick = |map: FieldMap| map.gz_t_per_m_per_a;
+        self.total(scene, grid, Components::Gz, &pick, progress)
+    }
+
+    /// B of all coils together at the nodes of `grid`, [z, y, x, 3], T.
+    ///
+    /// # Errors
+    /// As [`WorkingPoint::gz_t_per_m`].
+    pub fn field_t(
+        &self,
+        scene: &Scene,
+        grid: &Grid,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        let pick = |map: FieldMap| map.field_t_per_a.unwrap_or_default();
+        self.total(scene, grid, Components::All, &pick, progress)
+    }
+
+    /// What `pick` takes of the maps of the windings, at their currents, and of the steel.
+    fn total(
+        &self,
+        scene: &Scene,
+        grid: &Grid,
+        components: Components,
+        pick: &dyn Fn(FieldMap) -> Vec<f64>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
         let tolerance = EVALUATION_SHARE * self.tolerance;
-        let windings = tabulate(
-            &scene.winding,
-            &scene.coils,
-            grid,
-            Components::Gz,
-            tolerance,
-            progress,
-        )?;
-        let nodes = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
-        let mut whole = vec![0.0; nodes];
-        let mut add = |values: &[f64], factor: f64| {
-            for (whole, value) in whole.iter_mut().zip(values) {
-                *whole += factor * value;
-            }
-        };
+        let (winding, coils) = (&scene.winding, &scene.coils);
+        let windings = tabulate(winding, coils, grid, components, tolerance, progress)?;
         // The maps include the gains.
-        for (values, current) in windings
-            .gz_t_per_m_per_a
-            .chunks_exact(nodes.max(1))
-            .zip(&self.currents_a)
-        {
-            add(values, *current);
-        }
+        let mut whole = sum_of_coils(&pick(windings), &self.currents_a);
         if scene.core.is_some() {
             let (lowest_m, distance_m) = clearance_m(scene, &lowest_plane(grid), 0.0)?;
             let steel = self.field(scene, lowest_m, distance_m);
-            let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, 1, progress)?;
+            let sampled = SampledField::new(&steel, grid, components, tolerance, 1, progress)?;
             let all = PlacedCoil {
                 number: 0,
                 axis_m: [0.0, 0.0],
                 gain: 1.0,
             };
-            add(&sampled.map(&[all], grid, progress)?.gz_t_per_m_per_a, 1.0);
+            let steel = pick(sampled.map(&[all], grid, progress)?);
+            for (whole, value) in whole.iter_mut().zip(&steel) {
+                *whole += value;
+            }
         }
         Ok(whole)
     }
@@ -297,6 +309,18 @@ impl WorkingPoint {
         }
         Ok(total)
     }
+}
+
+/// The sum of the coils' blocks in `per_ampere` times their currents.
+pub(crate) fn sum_of_coils(per_ampere: &[f64], currents_a: &[f64]) -> Vec<f64> {
+    let size = per_ampere.len() / currents_a.len().max(1);
+    let mut sum = vec![0.0; size];
+    for (values, current) in per_ampere.chunks_exact(size.max(1)).zip(currents_a) {
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += current * value;
+        }
+    }
+    sum
 }
 
 /// A sentence on `what`, per ampere, that does not add up to the state at the working point.

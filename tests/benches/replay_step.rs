@@ -19,7 +19,7 @@ use std::process::{Command, Stdio};
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::bench::clock::Watch;
-use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
+use fluxform::commands::calibrate::{self, CalibrateOptions};
 use fluxform::commands::lambda::LambdaOptions;
 use fluxform::commands::replay::Opened;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
@@ -65,8 +65,6 @@ fn bundle(
     let (document, _) =
         ShapeDocument::read(&root.join("shapes/flat.toml")).map_err(|e| e.to_string())?;
     let options = CalibrateOptions {
-        out: folder.to_path_buf(),
-        force: false,
         lambda: LambdaOptions {
             force: ForceOverride {
                 direction: Some(direction),
@@ -74,9 +72,9 @@ fn bundle(
             },
             ..LambdaOptions::default()
         },
-        reach_m: DEFAULT_REACH_M,
         keep: false,
         page: false,
+        ..CalibrateOptions::new(folder)
     };
     let source = DesignSource {
         design: &design,

@@ -62,6 +62,7 @@ fn stages(design: &Design) -> Result<(), Failure> {
             formats: MapFormats::default(),
             mag_manip: Default::default(),
             force: false,
+            picture: false,
         };
         let measured = Stages::default();
         map::run(design, Vec::new(), &request, &measured)?;

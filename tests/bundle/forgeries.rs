@@ -460,6 +460,9 @@ const FORGERIES: &[Forgery] = &[
     ("a report that was not requested", Noticed, |p| {
         p.options().report = false;
     }),
+    ("files for ParaView that are not there", Noticed, |p| {
+        p.options().vtk = true;
+    }),
     ("a report removed", Noticed, |p| {
         p.others.remove("report.html");
     }),

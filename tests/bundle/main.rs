@@ -7,6 +7,7 @@ mod every_value;
 mod forgeries;
 mod hostile;
 mod loaders;
+mod vtk;
 mod whole;
 mod written;
 
@@ -19,6 +20,7 @@ fn main() -> ExitCode {
         forgeries::trials(),
         hostile::trials(),
         loaders::trials(),
+        vtk::trials(),
         whole::trials(),
         written::trials(),
     ];

@@ -4,6 +4,7 @@ mod cored;
 mod inputs;
 mod limit;
 mod near;
+mod picture;
 mod sideways;
 
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use fluxform::RunError;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::{from_npz, to_npz};
-use fluxform::commands::calibrate::{self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M};
+use fluxform::commands::calibrate::{self, CalibrateOptions, CalibrateReport};
 use fluxform::commands::lambda::LambdaOptions;
 use fluxform::commands::probe::ProbeRequest;
 use fluxform::commands::{evaluate, lambda, probe, verify};
@@ -45,12 +46,9 @@ fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateRe
         })
         .collect();
     let options = CalibrateOptions {
-        out: out.to_path_buf(),
-        force: false,
-        lambda: LambdaOptions::default(),
-        reach_m: DEFAULT_REACH_M,
         keep: false,
         page: false,
+        ..CalibrateOptions::new(out)
     };
     let source = DesignSource {
         design: &design,

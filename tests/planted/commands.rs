@@ -42,7 +42,7 @@ pub const COMMANDS: &[Writes] = &[
     Writes {
         earlier: "--no-report",
         bundle: true,
-        ..writes("calibrate", "calibrate air.toml bump.toml --out out")
+        ..writes("calibrate", "calibrate air.toml bump.toml --vtk --out out")
     },
     Writes {
         spoils: "steel.toml",
@@ -68,6 +68,7 @@ pub const COMMANDS: &[Writes] = &[
             "map air.toml --csv --vtk --vfield out/v.yaml --mpem out/m.yaml --mpem-tolerance 1e-1 --out out",
         )
     },
+    writes("map --plot", "map air.toml --out out --plot out/force.svg"),
     Writes {
         earlier: "--csv --vtk",
         ..writes("map (fewer files)", "map air.toml --out out")

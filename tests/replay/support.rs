@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use fluxform::bundle::artefact::Input;
-use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
+use fluxform::commands::calibrate::{self, CalibrateOptions};
 use fluxform::commands::lambda::LambdaOptions;
 use fluxform::commands::replay::Opened;
 use fluxform::design::{Design, Need};
@@ -54,8 +54,6 @@ impl Bundles {
             .collect();
         let folder = TempDir::new().expect("a temporary folder");
         let options = CalibrateOptions {
-            out: folder.path().to_path_buf(),
-            force: false,
             lambda: LambdaOptions {
                 force: ForceOverride {
                     direction: Some(direction),
@@ -63,9 +61,9 @@ impl Bundles {
                 },
                 ..LambdaOptions::default()
             },
-            reach_m: DEFAULT_REACH_M,
             keep: false,
             page: false,
+            ..CalibrateOptions::new(folder.path())
         };
         let source = DesignSource {
             design: &parsed,

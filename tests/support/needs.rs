@@ -73,6 +73,15 @@ pub fn numpy() -> Option<String> {
     })
 }
 
+/// Python with VTK, the library that ParaView is made of, where it is missing.
+#[must_use]
+pub fn vtk() -> Option<String> {
+    static ASKED: OnceLock<bool> = OnceLock::new();
+    missing("python3 with vtk", &ASKED, || {
+        answers("python3", &["-c", "import vtk"])
+    })
+}
+
 /// Python without packages, where it is missing.
 #[must_use]
 pub fn python() -> Option<String> {

@@ -60,8 +60,9 @@ pub struct Calibrate {
     /// Folder under which <design>/<shape>/ is written
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: FileArgument,
-    /// How far from the object's points the maps reach within the workspace, like 2cm [default:
-    /// 20mm]
+    /// Reach of the maps beyond the object [default: 20mm]
+    ///
+    /// How far from the object's points the maps reach within the workspace, like 2cm.
     #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
     /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
@@ -76,6 +77,12 @@ pub struct Calibrate {
     /// Leave out report.html and the folder plots
     #[arg(long)]
     no_report: bool,
+    /// Add the folder vtk, which ParaView opens
+    ///
+    /// The object with the forces at its points, requested and given; the coils with their currents; and
+    /// B at these currents over the workspace.
+    #[arg(long)]
+    vtk: bool,
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
@@ -129,6 +136,7 @@ impl Calibrate {
             keep: !self.no_cache,
             reach_m: self.reach.unwrap_or(DEFAULT_REACH_M),
             page: !self.no_report,
+            vtk: self.vtk,
         };
         let bar = begin(printer);
         let plan = self
@@ -139,7 +147,9 @@ impl Calibrate {
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
             printer.summary(Stream::Output, plan, || explained(plan))?;
         }
-        let components = if options.requests_vector(&shapes) {
+        let components = if options.vtk {
+            Components::All
+        } else if options.requests_vector(&shapes) {
             Components::Force
         } else {
             Components::Gz

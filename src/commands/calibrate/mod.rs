@@ -55,6 +55,7 @@ pub mod plan;
 mod recorded;
 pub(crate) mod requested_force;
 mod text;
+mod vtk;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -90,6 +91,8 @@ pub struct CalibrateOptions {
     pub keep: bool,
     /// Whether a page and plots for people are written too.
     pub page: bool,
+    /// Whether files for ParaView are written too.
+    pub vtk: bool,
 }
 
 impl CalibrateOptions {
@@ -102,6 +105,7 @@ impl CalibrateOptions {
             reach_m: DEFAULT_REACH_M,
             keep: true,
             page: true,
+            vtk: false,
         }
     }
 
@@ -131,6 +135,7 @@ impl CalibrateOptions {
             reach_m,
             keep: _,
             page,
+            vtk,
         } = self;
         let LambdaOptions {
             settings,
@@ -170,6 +175,7 @@ impl CalibrateOptions {
             default_error: default_error.filter(|_| free),
             reach_m: *reach_m,
             report: *page,
+            vtk: *vtk,
             arithmetic: arithmetic(),
             surface: surface(&shape.document, shape.input.as_ref()),
             sha256: String::new(),
@@ -534,6 +540,8 @@ impl Calibration<'_> {
         map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
         let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
         extra.extend((self.curve).map(|(_, text)| (CURVE_FILE, text.as_bytes())));
+        let vtk = self.vtk(grid_points, &lambda, &currents, progress)?;
+        extra.extend(vtk.iter().map(|(name, bytes)| (*name, &bytes[..])));
         let mut content = BundleContent {
             manifest,
             map: &map,

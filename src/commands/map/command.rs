@@ -14,6 +14,7 @@ use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -41,6 +42,8 @@ use crate::scene::cost;
     ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
     ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
      "for ParaView, less accurate"),
+    ("fluxform map designs/seed_air.toml --out drawn --components force --plot drawn/force.svg",
+     "drawn: slices of the force, and the force over height"),
     ("fluxform map designs/seed.toml --out maps_mm --vfield maps_mm/nodes.yaml --mpem maps_mm/mpem.yaml",
      "for mag_manip"),
     ("fluxform tabulate designs/seed.toml --out maps --format json --force",
@@ -50,7 +53,7 @@ pub struct Map {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// Contents of the map
+    /// Contents
     #[arg(long, default_value = Components::default().name(), value_parser = values::named::<Components>())]
     components: Components,
     /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or
@@ -72,6 +75,12 @@ pub struct Map {
     /// Write map.vti too
     #[arg(long)]
     vtk: bool,
+    /// Draw the force: slices, and over height (.svg, .png or .pdf)
+    ///
+    /// With every coil at its largest current across at the target's height and upright through the middle
+    /// coil, zero white; and that of one ampere above each coil that has no equal. `-` is standard output.
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot: Option<FileArgument>,
     /// Write the field per ampere on nodes for mag_manip's ForwardModelLinearVField too
     #[arg(long, hide_short_help = true, value_name = "FILE.yaml")]
     vfield: Option<FileArgument>,
@@ -177,7 +186,19 @@ impl Map {
                 vtk: self.vtk,
             },
             force: self.writing.force,
+            picture: self.plot.is_some(),
         };
+        let plot = self.plot.as_ref().map(|file| {
+            let written = MAP_FILES.map(|name| request.out.join(name));
+            let mag_manip = &request.mag_manip;
+            let beside = [&mag_manip.vector_field, &mag_manip.multipoles];
+            let beside = beside.into_iter().flatten().cloned();
+            let read = document.also_read().map(Path::to_path_buf);
+            Picture::new(file, request.force, beside.chain(read).chain(written))
+        });
+        if let Some(plot) = &plot {
+            plot.check(std::slice::from_ref(&document.input))?;
+        }
         let nodes = request.mag_manip.nodes.filter(|_| self.vfield.is_some());
         let vector_field = nodes.map(|nodes| cost::of_vector_field(design, nodes));
         allow(vector_field, CostOrigin::Flag, printer)?;
@@ -194,7 +215,11 @@ impl Map {
             printer.warning(warning);
         }
         let json = printer.with_warnings(&report);
-        printer.summary(Stream::Output, &json, || summary(design, &report))?;
+        let mut place = Stream::Output;
+        if let (Some(plot), Some(picture)) = (&plot, &report.picture) {
+            place = plot.draw(&report.sidecar.inputs, &picture.drawing(), printer)?;
+        }
+        printer.summary(place, &json, || summary(design, &report))?;
         accuracy_check(&report.accuracy_missed)?;
         if report
             .multipoles

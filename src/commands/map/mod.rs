@@ -3,6 +3,7 @@
 pub(crate) mod command;
 pub mod mag_manip;
 mod multipoles;
+mod picture;
 mod text;
 mod vector_field;
 
@@ -16,6 +17,7 @@ use self::mag_manip::{
     MagManipRequest, MultipolesMade, MultipolesSummary, VectorFieldMade, VectorFieldSummary,
 };
 pub use self::multipoles::MULTIPOLE_TOLERANCE;
+use self::picture::picture;
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, Options, SCHEMA_VERSION, UNITS};
@@ -29,6 +31,7 @@ use crate::design::Design;
 use crate::map::coupled_map::TableReport;
 use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap};
+use crate::plot::slices::SlicesPlot;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::maps::{MagnetMean, SceneMap};
@@ -56,6 +59,8 @@ pub struct MapRequest {
     pub mag_manip: MagManipRequest,
     /// Replace what is there, whatever it is.
     pub force: bool,
+    /// Whether the force is drawn.
+    pub picture: bool,
 }
 
 impl MapRequest {
@@ -82,6 +87,7 @@ impl MapRequest {
             formats: _,
             mag_manip,
             force: _,
+            picture: _,
         } = self;
         let MagManipRequest {
             vector_field: _,
@@ -132,6 +138,9 @@ pub struct MapReport {
     /// The multipole sources for mag_manip, where requested.
     #[serde(rename = "mpem", skip_serializing_if = "Option::is_none")]
     pub multipoles: Option<MultipolesSummary>,
+    /// The force that the maps stand for, where it is drawn.
+    #[serde(skip)]
+    pub picture: Option<SlicesPlot>,
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -250,7 +259,9 @@ pub fn run(
         &protected,
     )?;
     progress.end();
-    Ok(made.report(&scene, request, sidecar))
+    let picture = request.picture.then(|| picture(design, &arrays));
+    drop(arrays);
+    Ok(made.report(&scene, request, sidecar, picture))
 }
 
 /// The maps of `design` in memory, nothing written.
@@ -360,7 +371,13 @@ impl Made {
         accuracy
     }
 
-    fn report(self, scene: &Scene, request: &MapRequest, sidecar: MapSidecar) -> MapReport {
+    fn report(
+        self,
+        scene: &Scene,
+        request: &MapRequest,
+        sidecar: MapSidecar,
+        picture: Option<SlicesPlot>,
+    ) -> MapReport {
         let core = scene.core.as_ref();
         let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
         warnings.extend(self.together.and_then(|together| together.warning));
@@ -388,6 +405,7 @@ impl Made {
             requested,
             vector_field: self.vector_field.map(|made| made.summary),
             multipoles: self.multipoles.map(|made| made.summary),
+            picture,
             warnings,
         }
     }

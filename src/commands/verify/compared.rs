@@ -243,7 +243,10 @@ fn kept_and_pages(
     let mut pages = Vec::new();
     for file in stored {
         let copy = [DESIGN_FILE, CURVE_FILE].contains(&file.path.as_str());
-        let page = file.path.ends_with(".html") || file.path.starts_with("plots/");
+        let page = file.path.ends_with(".html")
+            || ["plots/", "vtk/"]
+                .iter()
+                .any(|folder| file.path.starts_with(folder));
         let other = again.iter().find(|other| other.path == file.path);
         if copy && other != Some(file) {
             faults.push(file.path.clone());

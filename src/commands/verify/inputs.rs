@@ -165,6 +165,7 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         Some(made) => {
             options.reach_m = made.reach_m;
             options.page = made.report;
+            options.vtk = made.vtk;
             options.lambda.force = ForceOverride {
                 direction: made.force_direction,
                 normal_force: made.normal_force,

@@ -10,6 +10,7 @@ pub mod matrix;
 pub mod pareto;
 pub mod plane;
 pub mod replay;
+pub mod slices;
 
 use std::collections::HashSet;
 

@@ -149,7 +149,7 @@ fn panel(drawn: &DrawnPanel) -> (Vec<Plot>, Layout) {
 }
 
 /// The factor and the unit that make the largest value readable.
-fn readable(values: &[f64], unit: &str) -> (f64, String) {
+pub(super) fn readable(values: &[f64], unit: &str) -> (f64, String) {
     let size = |most: f64, value: &f64| most.max(value.abs());
     let largest = values.iter().fold(0.0, size);
     match unit {

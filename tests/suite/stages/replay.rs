@@ -10,8 +10,7 @@ use fluxform::RunError;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::atomic::Scratch;
 use fluxform::bundle::replay::Answer;
-use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
-use fluxform::commands::lambda::LambdaOptions;
+use fluxform::commands::calibrate::{self, CalibrateOptions};
 use fluxform::commands::replay::Opened;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::design::{Design, Need};
@@ -65,12 +64,9 @@ fn bundle(scratch: &Scratch, text: &str, name: &str) -> Result<Opened, RunError>
     let (document, _) =
         ShapeDocument::from_toml(FLAT.text, Path::new(FLAT.path)).map_err(|error| fault(&error))?;
     let options = CalibrateOptions {
-        out,
-        force: false,
-        lambda: LambdaOptions::default(),
-        reach_m: DEFAULT_REACH_M,
         keep: false,
         page: false,
+        ..CalibrateOptions::new(out)
     };
     let source = DesignSource {
         design: &design,
