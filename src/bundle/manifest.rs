@@ -93,7 +93,8 @@ pub struct MadeWith {
     /// `--refine`; absent without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub refine: bool,
-    /// The error that holds where none was requested and the shape leaves its points to the program.
+    /// The error that holds where none was requested: of a shape that leaves its points to the program it decides
+    /// those, of another one whether it is warned of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub default_error: Option<f64>,
     /// `--weights`; absent without it.

@@ -214,6 +214,11 @@ fn points_that_nobody_gives_hold_the_default_error() {
     let run = place.run(&run).ends(0).json();
     assert_eq!(run["points"], 49);
     assert!(run["headline"].get("requested").is_none_or(Value::is_null));
+    let warnings = run["warnings"].to_string();
+    assert!(
+        warnings.contains("the default error of 1 % is exceeded") && warnings.contains("--refine"),
+        "{warnings}"
+    );
     place.run(&["calibrate", SEED, &free, "-q"]).ends(0);
     let manifest: Value =
         serde_json::from_slice(&place.read("results/seed_air/wedge/manifest.json")).unwrap();

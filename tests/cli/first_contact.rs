@@ -67,8 +67,10 @@ fn what_init_writes_calibrates_as_it_is() {
                 result["lambda_n_per_m"].as_f64().unwrap() > 0.1,
                 "{start} {object}"
             );
+            // What the given grid costs may exceed the default error, which is said.
+            let mut warnings = result["warnings"].as_array().unwrap().iter();
             assert!(
-                result["warnings"].as_array().unwrap().is_empty(),
+                warnings.all(|warning| warning.as_str().unwrap().contains("default error")),
                 "{start}: {}",
                 ran.out
             );

@@ -160,7 +160,6 @@ impl CalibrateOptions {
             at_n_per_m,
         } = *settings;
         let requested = error.filter(|target| !target.by_default);
-        let free = requested.is_none() && !shape.document.grid_is_given;
         let mut made_with = MadeWith {
             criterion: Some(criterion),
             jnd: Some(jnd_weight),
@@ -172,7 +171,7 @@ impl CalibrateOptions {
             uncertainty: *uncertainty,
             error: requested.map(|target| target.error),
             refine: requested.is_some_and(|target| target.refine),
-            default_error: default_error.filter(|_| free),
+            default_error: default_error.filter(|_| requested.is_none()),
             reach_m: *reach_m,
             report: *page,
             vtk: *vtk,
@@ -523,6 +522,8 @@ impl Calibration<'_> {
         if let Some((target, chosen)) = search {
             let tolerance = solved.forces.tolerance;
             lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
+        } else {
+            lambda.warn_beyond_default(self.options.lambda.default_error);
         }
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         let placed = Placed {

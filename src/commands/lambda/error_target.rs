@@ -134,6 +134,31 @@ impl Trial<'_> {
 }
 
 impl LambdaReport {
+    /// Warns where the computation may add more than the `default` that a shape is held to which leaves its
+    /// points to the program, as this one does not.
+    pub(crate) fn warn_beyond_default(&mut self, default: Option<f64>) {
+        let (Some(error), Some(headline)) = (default, &self.file.headline) else {
+            return;
+        };
+        if headline.force_error <= error {
+            return;
+        }
+        let target = ErrorTarget {
+            error,
+            refine: false,
+            by_default: true,
+        };
+        let cause = headline
+            .budget
+            .first()
+            .map_or("nothing", |part| part.part.words());
+        let advice = format!(
+            ", most of it from {cause}; the shape gives its points, which are obeyed (--error 1% --refine chooses them)"
+        );
+        let warning = target.exceeded("the computation may add", headline.force_error, &advice);
+        self.warnings.push(warning);
+    }
+
     /// States what became of the requested error, with a warning where it is exceeded. `workspace` is
     /// that of the map, where there is one.
     pub(crate) fn requested(

@@ -255,6 +255,8 @@ pub fn run(
         let mut report = whole(&of_grid)?;
         if let Some((target, chosen)) = &search {
             report.requested(*target, chosen, None, scene.tolerances.forces);
+        } else {
+            report.warn_beyond_default(options.default_error);
         }
         return Ok((points, report));
     };
