@@ -3,6 +3,7 @@
 import _thread
 import json
 import pathlib
+import signal
 import subprocess
 import sys
 
@@ -161,7 +162,9 @@ def interruption():
     """KeyboardInterrupt leaves nothing behind that would stop the next computation."""
     fine = fluxform.Design.from_toml(AIR.replace("13]", "901]").replace("11]", "901]"), "fine.toml")
     design, shape = written()
-    # As a signal's handler would, while the computation runs: a timer may come too late on a busy machine.
+    # A shell's background jobs ignore Ctrl-C, and Python then leaves it ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    # As the signal would, while the computation runs.
     try:
         fine.map("all", progress=lambda *_: _thread.interrupt_main())
         raise AssertionError("not stopped")
