@@ -43,15 +43,15 @@ impl ErrorTarget {
     pub const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
     /// Of shapes that leave their points to the program: a seventh of the 7 % that a finger notices.
     pub const DEFAULT: f64 = 0.01;
-    /// The share of the number of points.
-    const OF_POINTS: f64 = 0.4;
-    /// The share of heights between the points.
-    const BETWEEN_POINTS: f64 = 0.25;
+    /// The share of the number of points where a runtime takes its own parts, and where none does.
+    const OF_POINTS: [f64; 2] = [0.3, 0.7];
+    /// The share of heights between the points: they decide how many a rim needs.
+    const BETWEEN_POINTS: f64 = 0.4;
     /// The share of the map's interpolation.
-    const OF_INTERPOLATION: f64 = 0.2;
-    /// The field's tolerance over the error: forces and map nodes count about ten times, since all
-    /// coils may be off to the same side, and have a tenth of the budget between them.
-    const OF_FIELD: f64 = 0.005;
+    const OF_INTERPOLATION: f64 = 0.1;
+    /// The field's tolerance over the error: forces and map nodes count forty times each on the seed's array,
+    /// since all coils may be off to the same side, and have a fifth of the budget between them.
+    const OF_FIELD: f64 = 0.0025;
     /// No steel needs to be solved more coarsely.
     const COARSEST: f64 = 1e-3;
 
@@ -77,10 +77,11 @@ impl ErrorTarget {
         )
     }
 
-    /// What the number of points may add.
+    /// What the number of points may add, `for_runtime` or for lambda alone.
     #[must_use]
-    pub fn of_points(self) -> f64 {
-        Self::OF_POINTS * self.error
+    pub fn of_points(self, for_runtime: bool) -> f64 {
+        let [with, without] = Self::OF_POINTS;
+        self.error * if for_runtime { with } else { without }
     }
 
     /// What heights between the points may add.

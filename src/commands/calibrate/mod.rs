@@ -519,12 +519,8 @@ impl Calibration<'_> {
             needed.left_out.push(ignored.left_out());
         }
         self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
-        if let Some((target, chosen)) = search {
-            let tolerance = solved.forces.tolerance;
-            lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
-        } else {
-            lambda.warn_beyond_default(self.options.lambda.default_error);
-        }
+        let (default, tolerance) = (self.options.lambda.default_error, solved.forces.tolerance);
+        lambda.requested(search, default, Some(&design.workspace), tolerance);
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         let placed = Placed {
             design: scene.design,

@@ -128,7 +128,7 @@ impl Trial<'_> {
         };
         let between = between.map_or(0.0, |part| part.error);
         Ok(Some(
-            (of_points / target.of_points()).max(between / target.between_points()),
+            (of_points / target.of_points(self.for_runtime)).max(between / target.between_points()),
         ))
     }
 }
@@ -136,7 +136,7 @@ impl Trial<'_> {
 impl LambdaReport {
     /// Warns where the computation may add more than the `default` that a shape is held to which leaves its
     /// points to the program, as this one does not.
-    pub(crate) fn warn_beyond_default(&mut self, default: Option<f64>) {
+    fn warn_beyond_default(&mut self, default: Option<f64>) {
         let (Some(error), Some(headline)) = (default, &self.file.headline) else {
             return;
         };
@@ -159,15 +159,19 @@ impl LambdaReport {
         self.warnings.push(warning);
     }
 
-    /// States what became of the requested error, with a warning where it is exceeded. `workspace` is
-    /// that of the map, where there is one.
+    /// States what became of the error that a grid was chosen for, with a warning where it is exceeded; of a grid
+    /// that was not chosen a warning where it costs more than the `default`. `workspace` is that of the map, where
+    /// there is one.
     pub(crate) fn requested(
         &mut self,
-        target: ErrorTarget,
-        chosen: &ChosenGrid,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
+        default: Option<f64>,
         workspace: Option<&Workspace>,
         tolerance: f64,
     ) {
+        let Some((target, chosen)) = search else {
+            return self.warn_beyond_default(default);
+        };
         let Some(headline) = &mut self.file.headline else {
             return;
         };

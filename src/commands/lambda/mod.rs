@@ -253,11 +253,8 @@ pub fn run(
     };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = whole(&of_grid)?;
-        if let Some((target, chosen)) = &search {
-            report.requested(*target, chosen, None, scene.tolerances.forces);
-        } else {
-            report.warn_beyond_default(options.default_error);
-        }
+        let tolerance = scene.tolerances.forces;
+        report.requested(search.as_ref(), options.default_error, None, tolerance);
         return Ok((points, report));
     };
     // Feedback and picture are of the chosen points alone.
