@@ -93,6 +93,12 @@ impl Search {
     /// Takes the excess of the intervals that were tried; whether others are worth a try. There are
     /// at most `most` of them.
     fn tried(&mut self, excess: f64, most: f64) -> bool {
+        // An estimate that falls faster than that of a smooth surface is small by luck, and of many that are
+        // tried the luckiest would be taken.
+        let smooth = self.most.map_or(0.0, |(few, other)| {
+            other * (few / self.intervals).powf(SMOOTH)
+        });
+        let excess = excess.max(smooth);
         let now = (self.intervals, excess);
         let before = self.most.or(self.fewest);
         if let Some((intervals, other)) = before
@@ -124,5 +130,21 @@ impl Search {
             // The first one holds.
             (None, _) => false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regression_a_grid_was_taken_whose_estimate_was_small_by_luck() {
+        let mut search = Search::new(16.0);
+        assert!(search.tried(3.5, 768.0));
+        search.intervals = 23.0;
+        assert!(search.tried(0.36, 768.0) && search.fewest.is_none());
+        search.intervals = 46.0;
+        search.tried(0.8, 768.0);
+        assert_eq!(search.fewest, Some((46.0, 0.8)));
     }
 }
