@@ -8,7 +8,7 @@
 //!
 //! Where the surface ends or breaks within a cell, its corners alone describe it badly, and no choice
 //! among the points shows how badly. Such cells are divided into
-//! [`FINER`] x [`FINER`] finer ones.
+//! `FINER` x `FINER` finer ones.
 
 use std::collections::HashMap;
 
