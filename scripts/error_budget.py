@@ -67,8 +67,7 @@ def force_errors(bundle, places, direct, lambda_n_per_m):
     """The largest relative error of the rendered force at `places`, jumps left out."""
     height = places[:, 2]
     interpolated = bundle.height(places)
-    spacing = max(bundle.manifest["points"]["x_m"]["to_m"] - bundle.manifest["points"]["x_m"]["from_m"], 0.0)
-    spacing /= bundle.manifest["points"]["x_m"]["samples"] - 1
+    spacing = bundle.map["height_x_m"][1] - bundle.map["height_x_m"][0]
     with np.errstate(invalid="ignore"):
         smooth = np.abs(interpolated - height) < 0.25 * spacing
     smooth &= bundle.inside(places)

@@ -64,10 +64,11 @@ fn check_rendering(
     let Some(rendering) = &map.runtime.rendering else {
         return Ok(());
     };
+    let of_points = HeightGrid::of_points(&manifest.points, points);
     same(
         "map.npz and points.csv agree on the heights",
-        Some(&rendering.heights),
-        HeightGrid::of_points(&manifest.points, points).as_ref(),
+        of_points.is_some_and(|of_points| rendering.heights.goes_through(&of_points)),
+        true,
     )?;
     let fixed: Vec<f64> = currents.iter().map(|row| row.current_a).collect();
     same(
@@ -261,9 +262,9 @@ fn check_points(manifest: &Manifest, points: &[PointRow]) -> Result<(), String> 
         .flags()
         .ok_or("points.present does not fit points.x_m, y_m and count")?;
     same(
-        "points.csv has as many rows as points.count",
+        "points.csv has as many rows as points.count and points.graded",
         points.len(),
-        grid.count,
+        grid.count.saturating_add(grid.graded),
     )?;
     let (x, y) = (grid.x_m.axis(), grid.y_m.axis());
     let near = ON_GRID * (x.to - x.from).abs().max((y.to - y.from).abs());

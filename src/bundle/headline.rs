@@ -80,7 +80,9 @@ impl BudgetName {
         match self {
             Self::Points => "take about 1.5 times as many points along x and y",
             Self::Heights => "export the surface with half the chord tolerance",
-            Self::BetweenPoints => "take 1.4 times as many points along x and y",
+            Self::BetweenPoints => {
+                "take 1.4 times as many points along x and y, or let --refine add heights"
+            }
             Self::Forces | Self::MapNodes => "halve --tolerance",
             Self::Interpolation => "take 1.2 times as many nodes along each axis of [workspace]",
             Self::Pull | Self::PullMap => {
@@ -312,6 +314,9 @@ pub struct RequestedError {
     pub fixed: Vec<String>,
     /// Points along x and y.
     pub points: [usize; 2],
+    /// Heights along x and y between which a runtime interpolates; absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights: Option<[usize; 2]>,
     /// Nodes of the map's workspace along x, y and z; null where there is no map.
     pub nodes: Option<[usize; 3]>,
     /// Tolerance of the forces.

@@ -326,8 +326,17 @@ pub struct PointsGrid {
     /// How many points there are.
     pub count: usize,
     /// One string a grid row, y ascending; one character a node, x ascending: `1` where there is a
-    /// surface. The rows of `points.csv` are the ones in reading order.
+    /// surface. The first rows of `points.csv` are the ones in reading order.
     pub present: Vec<String>,
+    /// Rows of `points.csv` after those: points within cells in which the surface ends or breaks, so that their
+    /// corners describe it badly.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub graded: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl PointsGrid {
@@ -353,6 +362,7 @@ impl PointsGrid {
             present: present.chunks(x_m.samples.max(1)).map(row).collect(),
             x_m: x_m.into(),
             y_m: y_m.into(),
+            graded: 0,
         }
     }
 

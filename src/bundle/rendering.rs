@@ -167,6 +167,31 @@ impl HeightGrid {
         })
     }
 
+    /// These heights with those of `points` at its nodes; `None` where its grid is not one of every so many nodes of
+    /// this one.
+    #[must_use]
+    pub fn through(mut self, points: &Self) -> Option<Self> {
+        let columns = Every::of(&self.x_m, &points.x_m)?;
+        let rows = Every::of(&self.y_m, &points.y_m)?;
+        columns.copy(&points.x_m, &mut self.x_m);
+        rows.copy(&points.y_m, &mut self.y_m);
+        let (wide, narrow) = (self.x_m.len(), points.x_m.len());
+        for row in 0..points.y_m.len() {
+            for column in 0..narrow {
+                let to = rows.at(row) * wide + columns.at(column);
+                let from = row * narrow + column;
+                self.height_m[to] = points.height_m[from];
+                self.has_height[to] = points.has_height[from];
+            }
+        }
+        Some(self)
+    }
+
+    /// Whether these are the heights of `points` at its nodes, every so many of its own.
+    pub(super) fn goes_through(&self, points: &Self) -> bool {
+        self.clone().through(points).as_ref() == Some(self)
+    }
+
     /// The height at (x, y), m, bilinear between the four nodes around it; `None` off the grid and
     /// where a node that takes part has no surface. An axis of one node has a value on it alone.
     #[must_use]
@@ -215,6 +240,31 @@ impl HeightGrid {
             nodes,
             share: [s, t],
         })
+    }
+}
+
+/// Every so many nodes of an axis.
+struct Every(usize);
+
+impl Every {
+    /// Those that another axis of the same ends may be; `None` where its nodes do not divide it.
+    fn of(fine: &[f64], coarse: &[f64]) -> Option<Self> {
+        let intervals = |nodes: &[f64]| nodes.len().checked_sub(1);
+        match (intervals(fine)?, intervals(coarse)?) {
+            (0, 0) => Some(Self(1)),
+            (fine, coarse) => (coarse > 0 && fine % coarse == 0).then(|| Self(fine / coarse)),
+        }
+    }
+
+    fn at(&self, index: usize) -> usize {
+        index * self.0
+    }
+
+    /// The coarse axis's own last bits.
+    fn copy(&self, coarse: &[f64], fine: &mut [f64]) {
+        for (index, node) in coarse.iter().enumerate() {
+            fine[self.at(index)] = *node;
+        }
     }
 }
 
@@ -319,5 +369,50 @@ mod tests {
         assert_eq!(heights.height_m(0.2, 0.700_001), None);
         assert_eq!(heights.height_m(0.05, 0.7), None);
         assert_eq!(HeightGrid::of_points(&grid, &points[..1]), None);
+    }
+
+    #[test]
+    fn finer_heights_go_through_the_points_and_no_others_do() {
+        let axis = |samples| Axis {
+            from: -0.7,
+            to: 1.3,
+            samples,
+        };
+        let grid = |samples: usize, flags: &[bool], height_m: fn(f64) -> f64| {
+            let axis = axis(samples);
+            let points: Vec<PointRow> = (0..samples * samples)
+                .filter(|k| flags[*k])
+                .map(|k| PointRow {
+                    x_m: axis.node(k % samples),
+                    y_m: axis.node(k / samples),
+                    height_m: height_m(axis.node(k % samples)),
+                    normal: [0.0, 0.0, 1.0],
+                })
+                .collect();
+            HeightGrid::of_points(&PointsGrid::new(axis, axis, flags), &points).unwrap()
+        };
+        let mut flags = [true; 9];
+        flags[2] = false;
+        let points = grid(3, &flags, |x| 0.3 + 0.1 * x);
+        let fine = grid(7, &[true; 49], |x| 0.3 + 0.1 * x + 1e-17);
+        let through = fine.clone().through(&points).unwrap();
+        assert!(through.goes_through(&points) && points.goes_through(&points));
+        assert_eq!(through.height_m[3 * 7 + 3], points.height_m[4]);
+        assert_eq!(through.has_height[6], 0.0);
+        assert!(
+            !fine.goes_through(&points),
+            "a node without surface has none"
+        );
+        let mut other = through.clone();
+        other.height_m[3 * 7 + 3] += 1e-9;
+        assert!(!other.goes_through(&points));
+        other.height_m[3 * 7 + 3] -= 1e-9;
+        other.x_m[3] += 1e-9;
+        assert!(!other.goes_through(&points));
+        // Nodes of six intervals are not among those of four.
+        assert_eq!(
+            grid(5, &[true; 25], |x| 0.3 + x).through(&grid(4, &[true; 16], |x| 0.3 + x)),
+            None
+        );
     }
 }

@@ -317,8 +317,14 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
     } else {
         "requested"
     };
+    let apart = requested
+        .heights
+        .filter(|heights| *heights != requested.points);
+    let heights = apart.map_or_else(String::new, |heights| {
+        format!(", {} heights", grid(&heights))
+    });
     let mut lines = vec![format!(
-        "{} {holds} the {kind} {}: {}, tolerance {}",
+        "{} {holds} the {kind} {}: {}{heights}, tolerance {}",
         share(headline.force_error),
         share(requested.error),
         chosen(requested.points, requested.nodes),

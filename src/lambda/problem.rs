@@ -25,6 +25,31 @@ pub struct ForceProblem<'a> {
     pub resistance_ohm: &'a [f64],
 }
 
+impl ForceProblem<'_> {
+    /// Its first `points`, and the others.
+    ///
+    /// # Panics
+    /// When there are fewer.
+    #[must_use]
+    pub fn split_at(&self, points: usize) -> (Self, Self) {
+        let forces = self.forces_n_per_a.split_at(points * self.upper_a.len());
+        let heights = self.height_m.split_at(points);
+        let offsets = self.offset_n.map(|all| all.split_at(points)).unzip();
+        let weights = self.weights.map(|all| all.split_at(points)).unzip();
+        let part = |forces_n_per_a, height_m, offset_n, weights| Self {
+            forces_n_per_a,
+            height_m,
+            offset_n,
+            weights,
+            ..*self
+        };
+        (
+            part(forces.0, heights.0, offsets.0, weights.0),
+            part(forces.1, heights.1, offsets.1, weights.1),
+        )
+    }
+}
+
 /// The directions of current that a driver has, whatever its size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Directions {

@@ -44,9 +44,9 @@ impl ErrorTarget {
     /// Of shapes that leave their points to the program: a seventh of the 7 % that a finger notices.
     pub const DEFAULT: f64 = 0.01;
     /// The share of the number of points where a runtime takes its own parts, and where none does.
-    const OF_POINTS: [f64; 2] = [0.3, 0.7];
+    const OF_POINTS: [f64; 2] = [0.2, 0.7];
     /// The share of heights between the points: they decide how many a rim needs.
-    const BETWEEN_POINTS: f64 = 0.4;
+    const BETWEEN_POINTS: f64 = 0.35;
     /// The share of the map's interpolation.
     const OF_INTERPOLATION: f64 = 0.1;
     /// The field's tolerance over the error: forces and map nodes count forty times each on the seed's array,

@@ -52,6 +52,12 @@ impl Grid {
         self.len() == 0
     }
 
+    /// Samples along x and y.
+    #[must_use]
+    pub fn samples(&self) -> [usize; 2] {
+        [self.x_m.samples, self.y_m.samples]
+    }
+
     /// Range of x and of y.
     #[must_use]
     pub fn plan(&self) -> [[f64; 2]; 2] {

@@ -7,10 +7,9 @@
 //! area of a smooth silhouette converges with the second power of the spacing, as the rule does.
 //!
 //! Where the surface ends or breaks within a cell, its corners alone describe it badly, and no choice
-//! among the points shows how badly. Such cells are divided into
-//! `FINER` x `FINER` finer ones.
+//! among the points shows how badly. Such cells are quartered, and their quarters, until the corners do.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use rayon::prelude::*;
 
@@ -18,14 +17,20 @@ use crate::height::Grid;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 
-/// Divisions of either side of a cell that is not smooth.
-const FINER: usize = 4;
+/// How often a cell that is not smooth is quartered: at most, and where that gives too many samples at least.
+const DEPTHS: std::ops::RangeInclusive<u32> = 2..=4;
+/// Samples at most, if more quarters give more.
+const MOST_SAMPLES: usize = 65_536;
 /// Cells that are sampled, at most: those that depart most from their corners.
 const MOST_CELLS: usize = 4096;
-/// A cell is smooth whose middle departs by less than this share of its height from its corners' mean.
-const SMOOTH: f64 = 1e-3;
+/// A cell of the grid is smooth whose middle departs by less than this share of its height from its corners' mean.
+const SMOOTH: f64 = 4e-3;
+/// The same of its parts.
+const SMOOTH_PART: f64 = 1e-3;
 /// Bisections of a side: to 2e-5 of it.
 const BISECTIONS: u32 = 16;
+/// The same of a part of a cell: to 4e-3 of it.
+const PART_BISECTIONS: u32 = 8;
 /// The least that a point stands for, of a cell: no point counts for nothing.
 const LEAST: f64 = 1e-6;
 /// Sides between two looks at the progress.
@@ -49,9 +54,13 @@ pub struct FineCells {
     pub y_m: Vec<f64>,
     /// Height of each sample, m.
     pub height_m: Vec<f64>,
+    /// Unit normal of each sample, n_z >= 0.
+    pub normal: Vec<[f64; 3]>,
+    /// Normal of the other face, of each sample on a crease.
+    pub crease: Vec<Option<[f64; 3]>>,
     /// Plan area that each sample stands for, m^2.
     pub area_m2: Vec<f64>,
-    /// The same where every second sample along both axes stands for the cell; 0 for the others.
+    /// The same with one quartering less; 0 for the samples that this leaves out.
     pub coarse_area_m2: Vec<f64>,
     /// Plan area that each point of the grid stands for in smooth cells alone, m^2, >= 0.
     pub point_area_m2: Vec<f64>,
@@ -72,10 +81,22 @@ pub fn areas_m2(
     let broken = broken_cells(grid, heights_m, height_at, progress)?;
     let mut fine = FineCells::default();
     if !broken.is_empty() {
-        fine.smooth = vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)];
-        fine.point_area_m2 = vec![0.0; heights_m.len()];
-        for &cell in &broken {
-            fine.smooth[cell] = !fine.sample(grid, cell, height_at, progress)?;
+        for depth in DEPTHS.rev() {
+            fine = FineCells {
+                smooth: vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)],
+                point_area_m2: vec![0.0; heights_m.len()],
+                ..FineCells::default()
+            };
+            for &cell in &broken {
+                progress.check()?;
+                fine.smooth[cell] = !fine.sample(grid, cell, depth, height_at);
+                if fine.x_m.len() > MOST_SAMPLES && depth > *DEPTHS.start() {
+                    break;
+                }
+            }
+            if fine.x_m.len() <= MOST_SAMPLES {
+                break;
+            }
         }
     }
     let shares = Shares::new(grid, heights_m, height_at, progress)?;
@@ -92,63 +113,229 @@ pub fn areas_m2(
 }
 
 impl FineCells {
-    /// Samples a cell on the nodes of a finer grid; `false` where none has surface.
-    fn sample(
-        &mut self,
-        grid: &Grid,
-        cell: usize,
-        height_at: HeightAt,
-        progress: &dyn Progress,
-    ) -> Result<bool, Interrupted> {
+    /// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
+    /// from their corners; `false` where none has surface.
+    fn sample(&mut self, grid: &Grid, cell: usize, depth: u32, height_at: HeightAt) -> bool {
         let across = grid.x_m.samples - 1;
         let part = |axis: Axis, node: usize| Axis {
             from: axis.node(node),
             to: axis.node(node + 1),
-            samples: FINER + 1,
+            samples: (1 << depth) + 1,
         };
-        let finer = Grid {
+        let mut quarters = Quarters {
+            whole: depth,
             x_m: part(grid.x_m, cell % across),
             y_m: part(grid.y_m, cell / across),
+            height_at,
+            heights_m: BTreeMap::new(),
+            fine: Vec::new(),
+            coarse: Vec::new(),
         };
-        let nodes = (0..finer.len()).map(|k| [k % (FINER + 1), k / (FINER + 1)]);
-        let places: Vec<[f64; 2]> = nodes
-            .clone()
-            .map(|[i, j]| [finer.x_m.node(i), finer.y_m.node(j)])
-            .collect();
-        let heights_m: Vec<Option<f64>> = places.iter().map(|place| height_at(*place)).collect();
-        let mut areas = vec![0.0; finer.len()];
-        let shares = Shares::new(&finer, &heights_m, height_at, progress)?;
-        shares.each(|_, points, shares| {
-            points
-                .iter()
-                .zip(shares)
-                .for_each(|(point, share)| areas[*point] += share);
-        });
-        shares.keep_all(&mut areas);
-        let total: f64 = areas.iter().sum();
-        let is_even = |k: usize| {
-            [k % (FINER + 1), k / (FINER + 1)]
-                .iter()
-                .all(|at| at.is_multiple_of(2))
-        };
-        let of_even: f64 = (0..areas.len())
-            .filter(|k| is_even(*k))
-            .map(|k| areas[k])
-            .sum();
-        for (k, height_m) in heights_m.iter().enumerate() {
-            let Some(height_m) = height_m else { continue };
-            self.x_m.push(places[k][0]);
-            self.y_m.push(places[k][1]);
-            self.height_m.push(*height_m);
-            self.area_m2.push(areas[k]);
-            self.coarse_area_m2.push(match is_even(k) {
-                _ if of_even == 0.0 => areas[k],
-                true => areas[k] * total / of_even,
-                false => 0.0,
-            });
+        quarters.divide(depth, [0, 0]);
+        let Quarters { fine, coarse, .. } = quarters;
+        let area = |rule: &[Part]| rule.iter().map(|part| part.area_m2).sum::<f64>();
+        let total = area(&fine);
+        if total == 0.0 {
+            return false;
         }
-        Ok(total > 0.0)
+        let coarse = if coarse.is_empty() {
+            fine.clone()
+        } else {
+            coarse
+        };
+        let scale = total / area(&coarse);
+        // What both rules share is one sample.
+        let shared = |part: &Part| coarse.iter().any(|other| other == part);
+        let rules = fine.iter().map(|part| {
+            let of_coarse = if shared(part) {
+                scale * part.area_m2
+            } else {
+                0.0
+            };
+            (part, [part.area_m2, of_coarse])
+        });
+        let coarse_alone = coarse.iter().filter(|part| !fine.contains(part));
+        let coarse_alone = coarse_alone.map(|part| (part, [0.0, scale * part.area_m2]));
+        for (part, [area_m2, coarse_area_m2]) in rules.chain(coarse_alone) {
+            self.x_m.push(part.at_m[0]);
+            self.y_m.push(part.at_m[1]);
+            self.height_m.push(part.height_m);
+            self.area_m2.push(area_m2);
+            self.coarse_area_m2.push(coarse_area_m2);
+        }
+        true
     }
+}
+
+/// A node of the finest division of a cell, along x and y.
+type Node = [usize; 2];
+
+/// A part of a cell, and the sample that stands for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Part {
+    at_m: [f64; 2],
+    height_m: f64,
+    area_m2: f64,
+}
+
+/// Whether a part is not quartered, and its sample if it has surface.
+#[derive(Debug, Clone, Copy)]
+enum Leaf {
+    Is(Option<Part>),
+    IsNot,
+}
+
+/// A cell that is quartered where its corners describe the surface badly.
+struct Quarters<'a> {
+    /// How often it is quartered at most.
+    whole: u32,
+    /// The nodes of the finest division.
+    x_m: Axis,
+    y_m: Axis,
+    height_at: HeightAt<'a>,
+    heights_m: BTreeMap<Node, Option<f64>>,
+    /// Parts that are not quartered again.
+    fine: Vec<Part>,
+    /// The same without the last quartering of each.
+    coarse: Vec<Part>,
+}
+
+impl Quarters<'_> {
+    fn place(&self, node: Node) -> [f64; 2] {
+        [self.x_m.node(node[0]), self.y_m.node(node[1])]
+    }
+
+    fn height_m(&mut self, node: Node) -> Option<f64> {
+        let (place, at) = (self.place(node), self.height_at);
+        *self.heights_m.entry(node).or_insert_with(|| at(place))
+    }
+
+    /// Divides the part from the node `first` on, which is quartered `depth` times at most. Returns what stands
+    /// for it where it is not quartered.
+    fn divide(&mut self, depth: u32, first: Node) -> Leaf {
+        fluxform_base::progress::poll();
+        let side = 1 << depth;
+        let corners = AROUND.map(|by| [first[0] + side * by[0], first[1] + side * by[1]]);
+        let heights_m = corners.map(|corner| self.height_m(corner));
+        let smooth = match heights_m.iter().flatten().count() {
+            _ if depth == 0 => true,
+            0 => true,
+            4 => {
+                let mean = 0.25 * heights_m.iter().flatten().sum::<f64>();
+                let middle = self.height_m(first.map(|at| at + side / 2));
+                middle.is_some_and(|height| ((height - mean) / mean).abs() <= SMOOTH_PART)
+            }
+            _ => false,
+        };
+        // The whole cell is divided: that is why it is here.
+        if smooth && depth < self.whole {
+            let part = self.part(corners, heights_m);
+            self.fine.extend(part);
+            return Leaf::Is(part);
+        }
+        let half = side / 2;
+        let quarters = AROUND.map(|by| {
+            self.divide(
+                depth - 1,
+                [first[0] + half * by[0], first[1] + half * by[1]],
+            )
+        });
+        if quarters
+            .iter()
+            .all(|quarter| matches!(quarter, Leaf::Is(_)))
+        {
+            let part = self.part(corners, heights_m);
+            self.coarse.extend(part);
+        } else {
+            let leaves = quarters.into_iter().filter_map(|quarter| match quarter {
+                Leaf::Is(part) => part,
+                Leaf::IsNot => None,
+            });
+            self.coarse.extend(leaves);
+        }
+        Leaf::IsNot
+    }
+
+    /// What of a part has surface, with its middle; `None` without any.
+    fn part(&self, corners: [Node; 4], heights_m: [Option<f64>; 4]) -> Option<Part> {
+        let corners = corners.map(|corner| self.place(corner));
+        let mut outline = Vec::with_capacity(8);
+        for k in 0..4 {
+            let (next, here) = ((k + 1) % 4, corners[k]);
+            let present = [heights_m[k].is_some(), heights_m[next].is_some()];
+            if present[0] {
+                outline.push(here);
+            }
+            if present[0] != present[1] {
+                let (from, to) = if present[0] {
+                    (here, corners[next])
+                } else {
+                    (corners[next], here)
+                };
+                let covered = |p: [f64; 2]| (self.height_at)(p).is_some();
+                let part = covered_part(from, to, &covered, PART_BISECTIONS);
+                outline.push(along(from, to, part));
+            }
+        }
+        let (area_m2, middle) = area_and_middle(&outline)?;
+        let at_corner = || {
+            let mut present = corners.into_iter().zip(heights_m);
+            present.find_map(|(corner, height_m)| Some((corner, height_m?)))
+        };
+        // A bay of the silhouette may hold the middle.
+        let found = (self.height_at)(middle).map(|height_m| (middle, height_m));
+        let (at_m, height_m) = found.or_else(at_corner)?;
+        Some(Part {
+            at_m,
+            height_m,
+            area_m2,
+        })
+    }
+}
+
+/// The corners of a cell, one after the other around it.
+const AROUND: [Node; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+
+/// Area and centre of mass of an outline; `None` without area.
+fn area_and_middle(outline: &[[f64; 2]]) -> Option<(f64, [f64; 2])> {
+    let first = outline.first()?;
+    let (mut twice, mut moment) = (0.0, [0.0; 2]);
+    for pair in outline.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|p| [p[0] - first[0], p[1] - first[1]]);
+        let cross = a[0] * b[1] - a[1] * b[0];
+        twice += cross;
+        for k in 0..2 {
+            moment[k] += cross * (a[k] + b[k]) / 3.0;
+        }
+    }
+    (twice > 0.0).then(|| {
+        let middle = [0, 1].map(|k| first[k] + moment[k] / twice);
+        (0.5 * twice, middle)
+    })
+}
+
+fn along(from: [f64; 2], to: [f64; 2], part: f64) -> [f64; 2] {
+    [0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis]))
+}
+
+/// How far from `from`, which has surface, to `to`, which has none, the surface goes, as a part of that side.
+fn covered_part(
+    from: [f64; 2],
+    to: [f64; 2],
+    covered: &dyn Fn([f64; 2]) -> bool,
+    bisections: u32,
+) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..bisections {
+        let middle = 0.5 * (low + high);
+        if covered(along(from, to, middle)) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    // A surface that ends at the node itself goes nowhere from it.
+    if low == 0.0 { 0.0 } else { 0.5 * (low + high) }
 }
 
 /// What each cell of a grid gives its corners.
@@ -340,18 +527,7 @@ fn ends(
             } else {
                 (place(b), place(a))
             };
-            let (mut low, mut high) = (0.0, 1.0);
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (low + high);
-                let at = [0, 1].map(|axis| from[axis] + middle * (to[axis] - from[axis]));
-                if covered(at) {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            // A surface that ends at the node itself goes nowhere from it.
-            let part = if low == 0.0 { 0.0 } else { 0.5 * (low + high) };
+            let part = covered_part(from, to, covered, BISECTIONS);
             Ok((side, part))
         })
         .collect();

@@ -376,6 +376,14 @@ fn point_areas_m2(
     if !fine.smooth.is_empty() {
         fine.point_area_m2 = of_points(&fine.point_area_m2);
     }
+    for (x_m, y_m) in fine.x_m.iter().zip(&fine.y_m) {
+        let found = probe.at([*x_m, *y_m]);
+        let (normal, crease) = found.map_or(([0.0, 0.0, 1.0], None), |(sample, marks)| {
+            (sample.normal, marks.crease)
+        });
+        fine.normal.push(normal);
+        fine.crease.push(crease);
+    }
     Ok((of_points(&all), fine))
 }
 

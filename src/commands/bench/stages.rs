@@ -117,9 +117,10 @@ impl<'a> Bench<'a> {
             Points::Grid(samples) => {
                 let document = document.with_samples(samples);
                 let report = discretize::run(&document, Vec::new(), progress)?;
-                Ok(WantedPoints::of_grid(
+                Ok(WantedPoints::of_object(
                     &report,
                     self.request.lambda.weights_of(&report),
+                    &self.scene.design.workspace,
                 ))
             }
             Points::Graded {
@@ -203,7 +204,11 @@ impl<'a> Bench<'a> {
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
         let (_, lambda_s) = self.lambda(
             &solved,
-            &WantedPoints::of_grid(&report, self.request.lambda.weights_of(&report)),
+            &WantedPoints::of_object(
+                &report,
+                self.request.lambda.weights_of(&report),
+                &self.scene.design.workspace,
+            ),
         )?;
         let samples = present_samples(self.scene.design);
         let (_, map_s) = self.map(&solved, &grid, samples)?;

@@ -4,7 +4,7 @@ use super::BothSolved;
 use super::CalibrateOptions;
 use super::Calibration;
 use super::Inductances;
-use super::{LambdaReport, point_rows};
+use super::LambdaReport;
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::cache::Store;
@@ -12,7 +12,6 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
-use crate::commands::lambda::WantedPoints;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::FieldStore;
@@ -62,19 +61,14 @@ pub fn expected(
         checked: &[],
         options,
     };
-    let search = calibration.search(progress)?;
-    let document = search
-        .as_ref()
-        .map_or(&shape.document, |(_, chosen)| &chosen.document);
-    let points = calibration.points(document, progress)?;
+    let object = calibration.points(progress)?;
     let seal = |content: &BundleContent, _: &LambdaReport| Ok(sealed_manifest(content)?);
-    let (manifest, lambda) = calibration.compute(&points, search.as_ref(), progress, seal)?;
+    let (manifest, lambda) = calibration.compute(&object, progress, seal)?;
+    let wanted = object.wanted(&calibration);
     Ok(Expected {
         manifest,
-        weights: WantedPoints::of_grid(&points, options.lambda.weights_of(&points))
-            .weights()
-            .map(<[f64]>::to_vec),
-        points: point_rows(&points.discretized.points),
+        weights: wanted.weights().map(<[f64]>::to_vec),
+        points: wanted.rows(),
         lambda: lambda.file,
     })
 }

@@ -6,8 +6,9 @@ use super::needed_map::NeededMap;
 use crate::RunError;
 use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::lambda_file::LambdaFile;
-use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::between_points::between_points;
+use crate::commands::discretize::fewest_points::fewest_divisions;
+use crate::commands::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::commands::lambda::LambdaReport;
 use crate::commands::lambda::error_target::{ChosenGrid, ErrorTarget, Trial};
 use crate::commands::lambda::map_error::MapEffect;
@@ -20,6 +21,7 @@ impl Calibration<'_> {
     /// The grid for the requested error, where there is one.
     pub(super) fn search(
         &self,
+        opened: &OpenedSurface,
         progress: &dyn Progress,
     ) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
         let Some(target) = self.options.lambda.error else {
@@ -32,8 +34,38 @@ impl Calibration<'_> {
             options: &self.options.lambda,
             for_runtime: true,
         };
-        let chosen = trial.grid(&self.shape.document, target, progress)?;
+        let chosen = trial.grid(&self.shape.document, opened, target, progress)?;
         Ok(Some((target, chosen)))
+    }
+
+    /// The heights between which a runtime interpolates, where its share of the requested error needs more of them
+    /// than lambda needs points: every interval of the points' grid is divided.
+    pub(super) fn heights(
+        &self,
+        opened: &OpenedSurface,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
+        progress: &dyn Progress,
+    ) -> Result<Option<PointsReport>, RunError> {
+        let Some((target, chosen)) = search.filter(|(_, chosen)| !chosen.fixed) else {
+            return Ok(None);
+        };
+        let divided = fewest_divisions(&chosen.document, progress, |tried| {
+            let heights = PointsOptions {
+                marks: false,
+                ..PointsOptions::default()
+            };
+            let report = opened.discretize(tried, &heights, None, progress)?;
+            let between = between_points(&report).0;
+            Ok(between.map(|part| part.error / target.between_points()))
+        })?;
+        if divided.grid == chosen.document.grid {
+            return Ok(None);
+        }
+        // Creases decide in which direction a force along the normal points there.
+        let marks = self.force().along_normal().is_some();
+        opened
+            .discretize_cached((&divided, marks), self.field, progress)
+            .map(Some)
     }
 
     /// The workspace's samples for the requested error; `None`: the design's own.
@@ -69,7 +101,7 @@ impl Calibration<'_> {
     pub(super) fn add_to_headline(
         &self,
         lambda: &mut LambdaReport,
-        points: &PointsReport,
+        heights: &PointsReport,
         needed: &NeededMap,
         passive: Option<&PassiveMap>,
         progress: &dyn Progress,
@@ -86,11 +118,11 @@ impl Calibration<'_> {
             scene: self.scene,
             solved: &self.solved.forces,
             field: self.field,
-            points: &points.discretized.points,
+            points: &heights.discretized.points,
             lambda_n_per_m: headline.lambda_n_per_m,
             currents_a,
         };
-        let (heights, jumps) = between_points(points);
+        let (between, jumps) = between_points(heights);
         let made = &needed.made;
         let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
         let interpolation = effect.interpolation(&made.map, progress)?;
@@ -104,7 +136,7 @@ impl Calibration<'_> {
         });
         headline.jumps = jumps;
         headline.add(
-            [heights, Some(nodes), interpolation, pull]
+            [between, Some(nodes), interpolation, pull]
                 .into_iter()
                 .flatten(),
         );

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::discretize::{self, OpenedSurface, PointsReport, point_rows, points_grid};
 use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::placement::Placed;
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
@@ -23,7 +23,7 @@ use crate::bundle::manifest::{
 };
 use crate::bundle::npz::{PASSIVE, Runtime};
 use crate::bundle::rendering::{HeightGrid, Rendering};
-use crate::bundle::table::{CurrentRow, PointRow};
+use crate::bundle::table::CurrentRow;
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::Design;
@@ -41,7 +41,6 @@ use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
-use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
@@ -407,6 +406,24 @@ fn inputs(
     all.cloned().collect()
 }
 
+/// An object's points.
+struct ObjectPoints {
+    /// Those of lambda.
+    found: PointsReport,
+    /// Those between which a runtime interpolates; `None`: the same.
+    heights: Option<PointsReport>,
+    /// The requested error, and the grid that was chosen for it.
+    search: Option<(ErrorTarget, ChosenGrid)>,
+}
+
+impl ObjectPoints {
+    /// The points that the force constant of `of` is solved for.
+    fn wanted(&self, of: &Calibration) -> WantedPoints {
+        let rule = of.options.lambda.weights_of(&self.found);
+        WantedPoints::of_object(&self.found, rule, &of.scene.design.workspace)
+    }
+}
+
 /// One shape on a design whose sources are solved.
 #[derive(Clone, Copy)]
 struct Calibration<'a> {
@@ -430,14 +447,10 @@ impl Calibration<'_> {
             self.options,
             folder_of(self.scene, self.shape, self.options),
         );
-        let search = self.search(progress)?;
-        let document = search
-            .as_ref()
-            .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
-        let points = self.points(document, progress)?;
+        let points = self.points(progress)?;
         // Checked again where the surface that was parsed is not the one that was looked at first.
         let made_with = options.made_with(self.shape);
-        let inputs = &points.summary.inputs;
+        let inputs = &points.found.summary.inputs;
         if inputs != self.checked {
             check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
         }
@@ -458,40 +471,47 @@ impl Calibration<'_> {
             progress.end();
             Ok(manifest)
         };
-        let (manifest, lambda) = self.compute(&points, search.as_ref(), progress, write)?;
+        let (manifest, lambda) = self.compute(&points, progress, write)?;
         Ok(BundleReport {
             folder,
-            outside: points.summary.outside,
+            outside: points.found.summary.outside,
             lambda,
             manifest,
         })
     }
 
-    /// The object's points; their inputs are those of the whole bundle.
-    fn points(
-        &self,
-        document: &ShapeDocument,
-        progress: &dyn Progress,
-    ) -> Result<PointsReport, RunError> {
+    /// The object's points and heights; their inputs are those of the whole bundle.
+    fn points(&self, progress: &dyn Progress) -> Result<ObjectPoints, RunError> {
         let inputs = inputs(self.source, self.curve, self.shape);
-        discretize::run_cached(document, inputs, self.field, progress)
+        let opened = OpenedSurface::new(&self.shape.document, inputs, progress)?;
+        let search = self.search(&opened, progress)?;
+        let document = search
+            .as_ref()
+            .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
+        Ok(ObjectPoints {
+            found: opened.discretize_cached((document, true), self.field, progress)?,
+            heights: self.heights(&opened, search.as_ref(), progress)?,
+            search,
+        })
     }
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
     /// with its list of files.
     fn compute(
         &self,
-        points: &PointsReport,
-        search: Option<&(ErrorTarget, ChosenGrid)>,
+        object: &ObjectPoints,
         progress: &dyn Progress,
         take: impl FnOnce(&BundleContent, &LambdaReport) -> Result<Manifest, RunError>,
     ) -> Result<(Manifest, LambdaReport), RunError> {
         let (scene, solved, field) = (self.scene, self.solved, self.field);
+        let search = object.search.as_ref();
+        let heights = object.heights.as_ref().unwrap_or(&object.found);
+        let fine_points = &heights.discretized.points;
         let options = LambdaOptions {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights_of(points));
+        let of_grid = object.wanted(self);
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,
@@ -502,12 +522,11 @@ impl Calibration<'_> {
             (&options, self.force()),
             progress,
         )?;
-        let grid_points = &points.discretized.points;
-        let reach_m = self.options.reach_m;
-        let nodes = self.nodes(search, &lambda, grid_points, progress)?;
+        let grid_points = &object.found.discretized.points;
+        let nodes = self.nodes(search, &lambda, fine_points, progress)?;
         let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
         let design = gridded.as_ref().unwrap_or(scene.design);
-        let grid = (design, grid_points, reach_m);
+        let grid = (design, fine_points, self.options.reach_m);
         let vector = self.force().direction.is_vector();
         let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
@@ -518,22 +537,22 @@ impl Calibration<'_> {
             lambda.warnings.extend(ignored.warning(lambda.file.jnd));
             needed.left_out.push(ignored.left_out());
         }
-        self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
-        let (default, tolerance) = (self.options.lambda.default_error, solved.forces.tolerance);
-        lambda.requested(search, default, Some(&design.workspace), tolerance);
-        let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
+        self.add_to_headline(&mut lambda, heights, &needed, passive.as_ref(), progress)?;
+        let default = self.options.lambda.default_error;
+        let runtime = Some((&design.workspace, fine_points.grid.samples()));
+        lambda.requested(search, default, runtime, solved.forces.tolerance);
+        let mut manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
+        manifest.points.graded = of_grid.positions_m.len() - grid_points.len();
         let placed = Placed {
             design: scene.design,
             document: &self.shape.document,
             points: &of_grid,
         };
         placed.judge(&mut lambda);
-        let rows = point_rows(grid_points);
+        let rows = of_grid.rows();
         let currents = current_rows(scene, &lambda);
-        let mut map = arrays(
-            &needed.made,
-            self.runtime(&lambda, &manifest, grid_points, (&rows, &currents)),
-        );
+        let runtime = self.runtime(&lambda, (grid_points, fine_points), &currents);
+        let mut map = arrays(&needed.made, runtime);
         map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
         let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
         extra.extend((self.curve).map(|(_, text)| (CURVE_FILE, text.as_bytes())));
@@ -589,17 +608,18 @@ impl Calibration<'_> {
     fn runtime(
         &self,
         lambda: &LambdaReport,
-        manifest: &Manifest,
-        points: &ConstraintPoints,
-        (rows, currents): (&[PointRow], &[CurrentRow]),
+        (points, heights): (&ConstraintPoints, &ConstraintPoints),
+        currents: &[CurrentRow],
     ) -> Runtime {
         let circuit = &self.circuit.circuit;
-        let rendering = HeightGrid::of_points(&manifest.points, rows).map(|heights| Rendering {
-            heights,
+        let grid = |of: &ConstraintPoints| HeightGrid::of_points(&points_grid(of), &point_rows(of));
+        let heights_m = grid(points).and_then(|coarse| grid(heights)?.through(&coarse));
+        let rendering = heights_m.map(|heights_m| Rendering {
+            heights: heights_m,
             static_current_a: currents.iter().map(|row| row.current_a).collect(),
             inductance_h: circuit.inductance_h.concat(),
             voltage_v: circuit.voltage_v,
-            requested: requested_force::on_grid(self.force(), points),
+            requested: requested_force::on_grid(self.force(), heights),
             robust: lambda
                 .file
                 .uncertainty

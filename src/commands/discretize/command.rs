@@ -168,6 +168,7 @@ impl Discretize {
 
     fn options(&self) -> PointsOptions {
         PointsOptions {
+            marks: true,
             holes: self.holes,
             certify: self.certify,
             certify_seconds: self.certify_seconds,

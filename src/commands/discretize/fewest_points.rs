@@ -37,15 +37,14 @@ pub(crate) fn fewest_points(
     document: &ShapeDocument,
     target: ErrorTarget,
     progress: &dyn Progress,
-    mut excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
+    excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
 ) -> Result<(ShapeDocument, f64), RunError> {
     let most = if target.by_default {
         MOST_BY_DEFAULT
     } else {
         MOST
     };
-    let of_document = [document.grid.x, document.grid.y].map(AxisRequest::samples);
-    let longest = of_document[0].max(of_document[1]).saturating_sub(1).max(1);
+    let (of_document, longest) = samples_of(document);
     let sampled = |intervals: f64| {
         let factor = intervals / longest as f64;
         document.with_samples(of_document.map(|samples| match samples {
@@ -53,25 +52,42 @@ pub(crate) fn fewest_points(
             more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(5, most),
         }))
     };
-    let mut search = Search::new((FIRST - 1) as f64);
-    for _ in 0..ATTEMPTS {
-        progress.check()?;
-        let tried = sampled(search.intervals);
-        let Some(excess) = excess(&tried)? else {
-            return Ok((tried, search.order));
-        };
-        if !search.tried(excess, (most - 1) as f64) {
-            break;
-        }
-    }
-    let fewest = search.fewest.map(|(intervals, _)| intervals);
-    Ok((sampled(fewest.unwrap_or(search.intervals)), search.order))
+    let search = Search::new((FIRST - 1) as f64, (most - 1) as f64);
+    search.run(sampled, progress, excess)
+}
+
+/// `document` with every interval of its grid divided into the fewest equal ones whose excess is 1 or less.
+///
+/// # Errors
+/// Those of `excess`; interruption.
+pub(crate) fn fewest_divisions(
+    document: &ShapeDocument,
+    progress: &dyn Progress,
+    excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
+) -> Result<ShapeDocument, RunError> {
+    let (of_document, longest) = samples_of(document);
+    let most = ((MOST - 1) / longest).max(1);
+    let divided = |intervals: f64| {
+        let divisions = (intervals.round() as usize).div_ceil(longest).min(most);
+        document.with_samples(of_document.map(|samples| (samples - 1) * divisions + 1))
+    };
+    let search = Search::new(longest as f64, (most * longest) as f64);
+    Ok(search.run(divided, progress, excess)?.0)
+}
+
+/// The samples along x and y, and the intervals along the longer side.
+fn samples_of(document: &ShapeDocument) -> ([usize; 2], usize) {
+    let samples = [document.grid.x, document.grid.y].map(AxisRequest::samples);
+    let longest = samples[0].max(samples[1]).saturating_sub(1).max(1);
+    (samples, longest)
 }
 
 /// A search for the fewest intervals whose excess is 1 or less.
 struct Search {
     /// Those to be tried.
     intervals: f64,
+    /// So many at most.
+    limit: f64,
     /// With which power of the spacing the excess falls.
     order: f64,
     /// The most that fail, with their excess.
@@ -81,18 +97,46 @@ struct Search {
 }
 
 impl Search {
-    fn new(intervals: f64) -> Self {
+    fn new(intervals: f64, limit: f64) -> Self {
         Self {
             intervals,
+            limit,
             order: SMOOTH,
             most: None,
             fewest: None,
         }
     }
 
-    /// Takes the excess of the intervals that were tried; whether others are worth a try. There are
-    /// at most `most` of them.
-    fn tried(&mut self, excess: f64, most: f64) -> bool {
+    /// The document that `sampled` makes of the fewest intervals, and the order of convergence.
+    fn run(
+        mut self,
+        sampled: impl Fn(f64) -> ShapeDocument,
+        progress: &dyn Progress,
+        mut excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
+    ) -> Result<(ShapeDocument, f64), RunError> {
+        for _ in 0..ATTEMPTS {
+            progress.check()?;
+            let tried = sampled(self.intervals);
+            self.intervals = samples_of(&tried).1 as f64;
+            if self
+                .fewest
+                .is_some_and(|(fewest, _)| fewest == self.intervals)
+            {
+                break;
+            }
+            let Some(excess) = excess(&tried)? else {
+                return Ok((tried, self.order));
+            };
+            if !self.tried(excess) {
+                break;
+            }
+        }
+        let fewest = self.fewest.map(|(intervals, _)| intervals);
+        Ok((sampled(fewest.unwrap_or(self.intervals)), self.order))
+    }
+
+    /// Takes the excess of the intervals that were tried; whether others are worth a try.
+    fn tried(&mut self, excess: f64) -> bool {
         // An estimate that falls faster than that of a smooth surface is small by luck, and of many that are
         // tried the luckiest would be taken.
         let smooth = self.most.map_or(0.0, |(few, other)| {
@@ -124,8 +168,8 @@ impl Search {
             }
             (Some((few, excess)), None) => {
                 let finer = SPARE * excess.powf(1.0 / self.order);
-                self.intervals = (few * finer.clamp(*FINER.start(), *FINER.end())).min(most);
-                few < most
+                self.intervals = (few * finer.clamp(*FINER.start(), *FINER.end())).min(self.limit);
+                few < self.limit
             }
             // The first one holds.
             (None, _) => false,
@@ -139,12 +183,12 @@ mod tests {
 
     #[test]
     fn regression_a_grid_was_taken_whose_estimate_was_small_by_luck() {
-        let mut search = Search::new(16.0);
-        assert!(search.tried(3.5, 768.0));
+        let mut search = Search::new(16.0, 768.0);
+        assert!(search.tried(3.5));
         search.intervals = 23.0;
-        assert!(search.tried(0.36, 768.0) && search.fewest.is_none());
+        assert!(search.tried(0.36) && search.fewest.is_none());
         search.intervals = 46.0;
-        search.tried(0.8, 768.0);
+        search.tried(0.8);
         assert_eq!(search.fewest, Some((46.0, 0.8)));
     }
 }

@@ -54,6 +54,8 @@ pub struct PointsReport {
     pub discretized: Discretized,
     /// How the document says that they count.
     pub weights: Option<Weights>,
+    /// Whether the grid was given, and no points are to be added to it.
+    pub grid_is_given: bool,
     /// The JSON result.
     pub summary: PointsSummary,
 }
@@ -214,6 +216,8 @@ pub struct PointsOptions {
     pub certify_seconds: u64,
     /// Whether a picture will be drawn.
     pub picture: bool,
+    /// Whether points are flagged, and the areas that they stand for are computed.
+    pub marks: bool,
     /// How the points count, instead of what the document says.
     pub weights: Option<Weights>,
     /// The largest error of heights between the points, which are as few as hold it.
@@ -228,6 +232,7 @@ impl PointsOptions {
             certify,
             certify_seconds,
             picture: _,
+            marks: _,
             weights,
             error,
         } = *self;
@@ -254,6 +259,7 @@ impl Default for PointsOptions {
             certify: Certify::Vertical,
             certify_seconds: CERTIFY_SECONDS,
             picture: false,
+            marks: true,
             weights: None,
             error: None,
         }
@@ -345,27 +351,6 @@ pub struct RequestedHeights {
     pub jumps: Option<f64>,
 }
 
-/// As [`run`], with the certificate that an earlier run cached for these points and this surface.
-///
-/// # Errors
-/// As [`run_with`].
-pub(crate) fn run_cached(
-    document: &ShapeDocument,
-    inputs: Vec<Input>,
-    field: ShapeField,
-    progress: &dyn Progress,
-) -> Result<PointsReport, RunError> {
-    let opened = OpenedSurface::new(document, inputs, progress)?;
-    let cached = field.certificate(document, &opened.inputs);
-    let known = cached.known();
-    let new = known.is_none();
-    let report = opened.discretize(document, &PointsOptions::default(), known, progress)?;
-    if let (true, Some(certificate)) = (new, &report.discretized.certificate) {
-        cached.keep(certificate);
-    }
-    Ok(report)
-}
-
 /// A document's surface, read, and the inputs with the digest of the bytes that were parsed.
 pub(crate) struct OpenedSurface {
     surface: Surface,
@@ -397,6 +382,31 @@ impl OpenedSurface {
         })
     }
 
+    /// As [`Self::discretize`], flagged by `marks`, with the certificate that an earlier run cached for these points and
+    /// this surface.
+    ///
+    /// # Errors
+    /// As [`run_with`].
+    pub(crate) fn discretize_cached(
+        &self,
+        (document, marks): (&ShapeDocument, bool),
+        field: ShapeField,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
+        let cached = field.certificate(document, &self.inputs);
+        let known = cached.known();
+        let new = known.is_none();
+        let options = PointsOptions {
+            marks,
+            ..PointsOptions::default()
+        };
+        let report = self.discretize(document, &options, known, progress)?;
+        if let (true, Some(certificate)) = (new, &report.discretized.certificate) {
+            cached.keep(certificate);
+        }
+        Ok(report)
+    }
+
     /// The points of `document`, whose grid alone may differ from that of the document that was opened.
     ///
     /// # Errors
@@ -413,7 +423,7 @@ impl OpenedSurface {
             certify: options.certify,
             certify_seconds: options.certify_seconds,
             known,
-            marks: true,
+            marks: options.marks,
             cells: options.picture,
         };
         let surface = (&self.surface, self.warnings.clone());
@@ -505,6 +515,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
     PointsReport {
         discretized,
         weights: document.weights,
+        grid_is_given: document.grid_is_given,
         summary,
     }
 }
@@ -548,7 +559,7 @@ fn point_row(points: &ConstraintPoints, k: usize) -> PointRow {
     }
 }
 
-/// The grid of the points as a manifest states it.
+/// The grid of the points as a manifest states it, without graded points.
 #[must_use]
 pub fn points_grid(points: &ConstraintPoints) -> PointsGrid {
     let present: Vec<bool> = points

@@ -7,7 +7,6 @@ use super::LambdaReport;
 use super::points::{ForcesAt, WantedPoints};
 use crate::RunError;
 use crate::bundle::headline::{RequestedError, RunAtError};
-use crate::commands::discretize::between_points::between_points;
 use crate::commands::discretize::fewest_points::{SMOOTH, fewest_points};
 use crate::commands::discretize::{OpenedSurface, PointsOptions};
 use crate::design::Workspace;
@@ -30,7 +29,7 @@ pub(crate) struct ChosenGrid {
     /// The shape with that grid.
     pub(crate) document: ShapeDocument,
     /// Whether documents or flags gave it.
-    fixed: bool,
+    pub(crate) fixed: bool,
     /// With which power of the spacing the error fell.
     order: f64,
 }
@@ -42,7 +41,7 @@ pub(crate) struct Trial<'a> {
     pub(crate) solved: &'a Solved,
     pub(crate) field: ShapeField<'a>,
     pub(crate) options: &'a LambdaOptions,
-    /// Whether a runtime interpolates heights between the points.
+    /// Whether a runtime takes parts of the budget.
     pub(crate) for_runtime: bool,
 }
 
@@ -54,6 +53,7 @@ impl Trial<'_> {
     pub(crate) fn grid(
         &self,
         document: &ShapeDocument,
+        opened: &OpenedSurface,
         target: ErrorTarget,
         progress: &dyn Progress,
     ) -> Result<ChosenGrid, RunError> {
@@ -65,9 +65,12 @@ impl Trial<'_> {
         if chosen.fixed {
             return Ok(chosen);
         }
-        let opened = OpenedSurface::new(document, Vec::new(), progress)?;
-        let fewest = fewest_points(document, target, progress, |document| {
-            self.excess(&opened, document, target, progress)
+        let free = ShapeDocument {
+            grid_is_given: false,
+            ..document.clone()
+        };
+        let fewest = fewest_points(&free, target, progress, |document| {
+            self.excess(opened, document, target, progress)
         })?;
         (chosen.document, chosen.order) = fewest;
         Ok(chosen)
@@ -84,7 +87,11 @@ impl Trial<'_> {
     ) -> Result<Option<f64>, RunError> {
         let (scene, options) = (self.scene, self.options);
         let report = opened.discretize(document, &PointsOptions::default(), None, progress)?;
-        let points = WantedPoints::of_grid(&report, options.weights_of(&report));
+        let points = WantedPoints::of_object(
+            &report,
+            options.weights_of(&report),
+            &scene.design.workspace,
+        );
         let positions = &points.positions_m;
         let forces_n_per_a =
             (self.field).forces_n_per_a("trial", scene, self.solved, positions, progress)?;
@@ -122,14 +129,7 @@ impl Trial<'_> {
         let of_points = points
             .error_against_limit(lambda, (&problem, &unwired), with, at)?
             .unwrap_or(1.0);
-        let between = match self.for_runtime {
-            true => between_points(&report).0,
-            false => None,
-        };
-        let between = between.map_or(0.0, |part| part.error);
-        Ok(Some(
-            (of_points / target.of_points(self.for_runtime)).max(between / target.between_points()),
-        ))
+        Ok(Some(of_points / target.of_points(self.for_runtime)))
     }
 }
 
@@ -160,13 +160,13 @@ impl LambdaReport {
     }
 
     /// States what became of the error that a grid was chosen for, with a warning where it is exceeded; of a grid
-    /// that was not chosen a warning where it costs more than the `default`. `workspace` is that of the map, where
-    /// there is one.
+    /// that was not chosen a warning where it costs more than the `default`. `runtime` is the map's workspace and
+    /// the nodes of the heights, where there are any.
     pub(crate) fn requested(
         &mut self,
         search: Option<&(ErrorTarget, ChosenGrid)>,
         default: Option<f64>,
-        workspace: Option<&Workspace>,
+        runtime: Option<(&Workspace, [usize; 2])>,
         tolerance: f64,
     ) {
         let Some((target, chosen)) = search else {
@@ -176,6 +176,7 @@ impl LambdaReport {
             return;
         };
         let samples = [chosen.document.grid.x, chosen.document.grid.y].map(AxisRequest::samples);
+        let (workspace, heights) = runtime.unzip();
         let nodes = workspace.map(|w| [w.x_m, w.y_m, w.z_m].map(|axis| axis.samples));
         let nodes_fixed = workspace.is_some_and(|w| w.is_given && !target.refine);
         let mut fixed = Vec::new();
@@ -234,6 +235,7 @@ impl LambdaReport {
             met,
             fixed,
             points: samples,
+            heights,
             nodes,
             tolerance,
             elsewhere: elsewhere.collect(),

@@ -28,7 +28,7 @@ use self::placement::Placed;
 pub(crate) use self::points::{ForcesAt, WantedPoints};
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
-use super::discretize::{self, PointsReport};
+use super::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::Input;
@@ -202,13 +202,14 @@ pub fn run(
 ) -> Result<(PointsReport, LambdaReport), RunError> {
     let options = &options.for_document(document);
     let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
-    let search = search(&scene, document, options, progress)?;
+    let opened = OpenedSurface::new(document, inputs.clone(), progress)?;
+    let search = search(&scene, (document, &opened), options, progress)?;
     let document = search
         .as_ref()
         .map_or(document, |(_, chosen)| &chosen.document);
     let options = &options.over(document);
-    let points = discretize::run(document, inputs.clone(), progress)?;
-    let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
+    let points = opened.discretize(document, &PointsOptions::default(), None, progress)?;
+    let of_grid = WantedPoints::of_object(&points, options.weights_of(&points), &design.workspace);
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
@@ -276,7 +277,7 @@ pub fn run(
 /// The grid for the requested error, where one is requested and the points are those of a grid.
 fn search(
     scene: &Scene,
-    document: &ShapeDocument,
+    (document, opened): (&ShapeDocument, &OpenedSurface),
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
@@ -294,7 +295,7 @@ fn search(
         options,
         for_runtime: false,
     };
-    let chosen = trial.grid(document, target, progress)?;
+    let chosen = trial.grid(document, opened, target, progress)?;
     Ok(Some((target, chosen)))
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
+use crate::bundle::table::PointRow;
 use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::scattered::ScatteredReport;
 use crate::design::Workspace;
@@ -72,7 +73,21 @@ pub(crate) struct ForcesAt<'a> {
     pub(crate) progress: &'a dyn Progress,
 }
 
+/// The least that a point counts for, of the most.
+const LEAST: f64 = 1e-6;
+
 impl WantedPoints {
+    /// Those of a grid, which count by `rule`. Where they count by area and nobody gave the grid, samples of the
+    /// cells that they describe badly are points too, after those of the grid, none below `workspace` or the
+    /// lowest point of the grid.
+    pub(crate) fn of_object(report: &PointsReport, rule: Weights, workspace: &Workspace) -> Self {
+        let mut points = Self::of_grid(report, rule);
+        if rule == Weights::Area && !report.grid_is_given {
+            points.add_graded(workspace);
+        }
+        points
+    }
+
     /// Those of a grid, which count by `rule`.
     pub(crate) fn of_grid(report: &PointsReport, rule: Weights) -> Self {
         let points = &report.discretized.points;
@@ -97,6 +112,43 @@ impl WantedPoints {
             fine: Some(points.fine.clone()).filter(|fine| !fine.smooth.is_empty()),
             warnings: summary.warnings.clone(),
         }
+    }
+
+    /// Makes points of the samples of cells that the grid's points describe badly.
+    fn add_graded(&mut self, workspace: &Workspace) {
+        let Some(fine) = &self.fine else { return };
+        let places = self.sample_places_m(fine, workspace);
+        // A point counts, however little.
+        let all = || fine.point_area_m2.iter().chain(&fine.area_m2);
+        let least_m2 = LEAST * all().copied().fold(0.0, f64::max);
+        self.areas = all().map(|area| area.max(least_m2)).collect();
+        self.height_m.extend(places.iter().map(|place| place[2]));
+        self.normals.extend(&fine.normal);
+        self.other_normals.extend(&fine.crease);
+        self.positions_m.extend(places);
+    }
+
+    /// How many points lie on the grid, where samples of its cells are points too.
+    fn before_graded(&self) -> Option<usize> {
+        let on_grid = self.grid.as_ref()?.index.len();
+        (on_grid < self.positions_m.len()).then_some(on_grid)
+    }
+
+    /// As rows of `points.csv`.
+    pub(crate) fn rows(&self) -> Vec<PointRow> {
+        let places = self
+            .positions_m
+            .iter()
+            .zip(&self.height_m)
+            .zip(&self.normals);
+        places
+            .map(|(([x_m, y_m, _], height_m), normal)| PointRow {
+                x_m: *x_m,
+                y_m: *y_m,
+                height_m: *height_m,
+                normal: *normal,
+            })
+            .collect()
     }
 
     pub(crate) fn of_scattered(report: &ScatteredReport) -> Self {
@@ -160,6 +212,13 @@ impl WantedPoints {
             index: &grid.index,
             smooth: cells.map_or(&[], |fine| &fine.smooth),
         });
+        if let (Some(cells), Some(on_grid)) = (cells, self.before_graded()) {
+            let (of_grid, graded) = problem.split_at(on_grid);
+            let fine = Some(fine_samples(cells, &graded, true));
+            let areas = &self.areas[..on_grid];
+            let found = limit_error(&of_grid, lambda_n_per_m, areas, grid, fine, settings);
+            return Ok(found?);
+        }
         let places_m = cells.map_or_else(Vec::new, |fine| {
             self.sample_places_m(fine, &at.scene.design.workspace)
         });
@@ -182,14 +241,8 @@ impl WantedPoints {
             .as_ref()
             .zip(rewired.as_ref())
             .map(|(plain, re)| re.problem(plain));
-        let fine = cells.zip(wired.as_ref()).map(|(cells, wired)| FineSamples {
-            forces_n_per_a: wired.forces_n_per_a,
-            height_m: wired.height_m,
-            offset_n: wired.offset_n,
-            areas: &cells.area_m2,
-            coarse_areas: &cells.coarse_area_m2,
-            point_areas: &cells.point_area_m2,
-        });
+        let fine = cells.zip(wired.as_ref());
+        let fine = fine.map(|(cells, wired)| fine_samples(cells, wired, false));
         Ok(limit_error(
             problem,
             lambda_n_per_m,
@@ -233,6 +286,22 @@ impl WantedPoints {
             .filter(|(name, _)| **name != "points")
             .map(|(name, stage)| (format!("points_{name}"), stage.clone()))
             .collect()
+    }
+}
+
+fn fine_samples<'a>(
+    cells: &'a FineCells,
+    samples: &ForceProblem<'a>,
+    are_points: bool,
+) -> FineSamples<'a> {
+    FineSamples {
+        are_points,
+        forces_n_per_a: samples.forces_n_per_a,
+        height_m: samples.height_m,
+        offset_n: samples.offset_n,
+        areas: &cells.area_m2,
+        coarse_areas: &cells.coarse_area_m2,
+        point_areas: &cells.point_area_m2,
     }
 }
 

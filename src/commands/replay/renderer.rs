@@ -169,7 +169,10 @@ impl Renderer {
         let lambda_n_per_m = runtime
             .lambda_n_per_m
             .ok_or(RendererError::NoForceConstant)?;
-        let heights = HeightGrid::of_points(&bundle.manifest.points, &bundle.points)
+        let rendering = runtime.rendering.as_ref();
+        let heights = rendering
+            .map(|rendering| rendering.heights.clone())
+            .or_else(|| HeightGrid::of_points(&bundle.manifest.points, &bundle.points))
             .ok_or(RendererError::Points)?;
         let allocator = Allocator::new(
             &runtime.resistance_ohm,
@@ -178,10 +181,7 @@ impl Renderer {
             runtime.total_current_max_a,
         )?;
         let map = ForceMap::new(bundle);
-        let requested = runtime
-            .rendering
-            .as_ref()
-            .and_then(|r| r.requested.as_ref());
+        let requested = rendering.and_then(|r| r.requested.as_ref());
         let requested = requested.filter(|_| map.has_vectors());
         let vector = requested.map(|requested| {
             let allocator = VectorAllocator::new(
