@@ -61,6 +61,17 @@ pub enum Stream {
     Error,
 }
 
+impl Stream {
+    /// The one that is left where two outputs may have gone to standard output.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        match self {
+            Self::Output => other,
+            Self::Error => Self::Error,
+        }
+    }
+}
+
 /// A result and the warnings about it, as one JSON object.
 #[derive(Debug, Serialize)]
 pub struct WithWarnings<'a, T> {

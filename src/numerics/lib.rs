@@ -27,4 +27,5 @@ pub mod refinement;
 pub mod ring_functions;
 pub mod small_quadratic;
 pub mod spectral;
+pub mod streamlines;
 pub mod vec3;

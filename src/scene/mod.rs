@@ -7,6 +7,7 @@ pub mod cost;
 pub mod drawing;
 pub mod evaluation_sample;
 pub mod felt_force;
+pub mod field_slice;
 pub mod iron;
 pub mod maps;
 pub mod neighbours;

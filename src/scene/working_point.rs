@@ -355,6 +355,32 @@ pub struct TotalField {
 }
 
 impl TotalField {
+    /// Of steel that is linear at these currents, gains included, for places no lower and no closer to a
+    /// core than `clearances_m`; `None` without steel.
+    #[must_use]
+    pub fn linear(
+        scene: &Scene,
+        solved: &Solved,
+        currents_a: &[f64],
+        clearances_m: [f64; 2],
+    ) -> Option<Self> {
+        let (top_m, _) = scene.steel_extent_m()?;
+        let sources = solved.sources_at(scene, clearances_m, 1.0)?;
+        let parts = match sources.coupled() {
+            Some(all) => {
+                let driven = SteelField::Coupled(all.at_currents(currents_a));
+                vec![(1.0, [0.0, 0.0], driven)]
+            }
+            None => {
+                let coils = scene.coils.iter().zip(currents_a);
+                coils
+                    .map(|(coil, current)| (*current, coil.axis_m, SteelField::clone(&sources)))
+                    .collect()
+            }
+        };
+        Some(Self { parts, top_m })
+    }
+
     /// The field at `points_m`, [component, point].
     #[must_use]
     pub fn at(&self, points_m: &[[f64; 3]], parts: Components) -> Vec<f64> {

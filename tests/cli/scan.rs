@@ -666,3 +666,39 @@ fn stated_intervals_hold_random_truths() {
     }
     assert!(held * 10 >= tried * 9, "{held} of {tried}");
 }
+
+#[test]
+fn a_scan_is_drawn_beside_its_fit() {
+    let place = Place::new();
+    let scan = [
+        "probe",
+        "designs/seed_air.toml",
+        "--compare",
+        "designs/scan_example.csv",
+    ];
+    let run = |more: &[&str]| place.run(&[&scan[..], more].concat());
+    run(&["--noise-t", "2e-6", "--plot", "fit.svg"])
+        .ends(0)
+        .says(&["written: fit.svg"]);
+    let svg = String::from_utf8(place.read("fit.svg")).unwrap();
+    for text in [
+        "designs/scan_example.csv against seed_air",
+        "measured / mT",
+        "field: measured minus fitted",
+        "bz_t, fitted",
+        "1 and 2 times the stated noise",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    run(&["--plot", "fit.pdf"]).ends(0);
+    assert!(place.read("fit.pdf").starts_with(b"%PDF"));
+    run(&["--plot", "-", "--out", "-"]).ends(2);
+    let alone = [
+        "probe",
+        "designs/seed_air.toml",
+        "points.csv",
+        "--plot",
+        "fit.svg",
+    ];
+    place.run(&alone).ends(2).says(&["[POINTS]"]);
+}

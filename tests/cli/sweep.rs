@@ -461,3 +461,53 @@ fn each_step_explains_itself_and_its_examples_work() {
         assert!(lines.count() >= 2, "{examples}");
     }
 }
+
+#[test]
+fn one_key_is_drawn_as_a_curve_and_two_as_a_map() {
+    let place = Place::new();
+    let outer = ["--set", "coil.outer_diameter_mm=34:38:2"];
+    let inner = ["--set", "coil.inner_diameter_mm=20,23,26"];
+    let wire = ["--set", "wire.diameter_mm=0.6,0.7"];
+    let run = |name: &str, keys: &[[&str; 2]]| {
+        let plan = format!("{name}.json");
+        let plan_args = ["sweep", "plan", "designs/seed_air.toml", "--out", &plan];
+        place
+            .run(&[&plan_args[..], &keys.concat()].concat())
+            .ends(0);
+        place.run(&["sweep", "run", &plan, "--out", name]).ends(0);
+    };
+    let merge = |name: &str, plot: &str| {
+        let (plan, table) = (format!("{name}.json"), format!("{name}.csv"));
+        place.run(&[
+            "sweep", "merge", &plan, name, "--out", &table, "--plot", plot,
+        ])
+    };
+    run("two", &[inner, outer]);
+    merge("two", "map.svg").ends(0).says(&["written: map.svg"]);
+    let svg = String::from_utf8(place.read("map.svg")).unwrap();
+    for text in [
+        "coil.inner_diameter_mm",
+        "coil.outer_diameter_mm",
+        "force on the magnet / mN",
+        "hatched: breaks a limit",
+        "strongest within its limits",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    run("one", &[outer]);
+    merge("one", "curve.png").ends(0);
+    assert!(place.read("curve.png").starts_with(b"\x89PNG"));
+    run("three", &[inner, outer, wire]);
+    merge("three", "drawn.svg")
+        .ends(4)
+        .says(&["this plan has 3"]);
+    assert!(!place.path("drawn.svg").exists() && !place.path("three.csv").exists());
+    merge("two", "-").ends(0);
+    let both = [
+        "sweep", "merge", "two.json", "two", "--out", "-", "--plot", "-",
+    ];
+    place
+        .run(&both)
+        .ends(2)
+        .says(&["only one can go to standard output"]);
+}

@@ -3,7 +3,9 @@
 use clap::Args;
 
 use super::{Evaluation, LimitedBy, Transient, evaluate};
+use crate::RunError;
 use crate::accuracy::StageAccuracy;
+use crate::bundle::atomic::check_distinct;
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
@@ -21,6 +23,7 @@ use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
 use crate::scene::drawing::drawing;
+use crate::scene::field_slice;
 use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
 use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 
@@ -52,6 +55,12 @@ pub struct Evaluate {
     /// output
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
+    /// Draw the field in that section, with field lines
+    ///
+    /// With every coil at its largest current, along the B-H curve where there is one: |B| by its
+    /// logarithm around the array, grey in and close to the surface of steel, and B_z over the workspace.
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot_field: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
@@ -67,14 +76,22 @@ impl Evaluate {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
         let design = &document.design;
         let force = self.writing.force;
-        let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));
-        if let Some(plot) = &plot {
-            plot.check(std::slice::from_ref(&document.input))?;
+        let files = [&self.plot, &self.plot_field].map(Option::as_ref);
+        check_distinct(files.iter().flatten().map(|file| file.as_given()))
+            .map_err(RunError::from)?;
+        let [plot, plot_field] =
+            files.map(|file| file.map(|file| Picture::new(file, force, document.also_read())));
+        for picture in [&plot, &plot_field].into_iter().flatten() {
+            picture.check(std::slice::from_ref(&document.input))?;
         }
         let steel = of_steel(design, self.tolerance.tolerance);
         allow(steel, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
+        let field = match &plot_field {
+            Some(_) => field_slice::picture(design, &bar)?,
+            None => None,
+        };
         drop(bar);
         for warning in &result.warnings {
             printer.warning(warning);
@@ -83,6 +100,9 @@ impl Evaluate {
         let mut place = Stream::Output;
         if let (Some(plot), Some(drawn)) = (&plot, drawing(design)) {
             place = plot.draw(&result.inputs, &drawn.drawing(), printer)?;
+        }
+        if let (Some(plot), Some(drawn)) = (&plot_field, field) {
+            place = place.or(plot.draw(&result.inputs, &drawn.drawing(), printer)?);
         }
         printer.summary(place, &json, || summary(design, &result))?;
         accuracy_check(&result.accuracy_missed)?;

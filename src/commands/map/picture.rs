@@ -3,7 +3,7 @@
 use crate::bundle::force_map::ForceMap;
 use crate::bundle::npz::MapArrays;
 use crate::design::Design;
-use crate::plot::slices::{HeightCurve, Slice, SlicesPlot};
+use crate::plot::slices::{HeightCurve, Shades, Slice, SlicesPlot};
 
 /// Curves that differ by no more than this part of the largest value are one line in a drawing.
 const ALIKE: f64 = 2e-3;
@@ -54,8 +54,11 @@ pub(super) fn picture(design: &Design, map: &MapArrays) -> SlicesPlot {
             title: [format!("F_{}", ["x", "y", "z"][*part]), place.clone()],
             axes: *axes,
             ends_m: *ends_m,
+            unit: "N",
             columns: x.len(),
-            values_n: forces.iter().map(|force| force[*part]).collect(),
+            values: forces.iter().map(|force| Some(force[*part])).collect(),
+            shades: Shades::Signed,
+            lines: Vec::new(),
         })
     });
     SlicesPlot {

@@ -165,10 +165,7 @@ impl Optimize {
         }
         let mut place = self.write(&result, &mark, &overwrite, printer)?;
         if let Some(page) = &page {
-            let after = page.write(&result.inputs, &page::html(&result), printer)?;
-            if after == Stream::Error {
-                place = after;
-            }
+            place = place.or(page.write(&result.inputs, &page::html(&result), printer)?);
         }
         let json = printer.with_warnings(&result);
         printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))?;

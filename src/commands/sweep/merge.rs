@@ -15,10 +15,14 @@ use crate::bundle::sweep::{
     MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
 };
 use crate::numerics::front::front;
+use crate::plot::landscape::Landscape;
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
 
+mod landscape;
 mod page;
+
+pub(crate) use landscape::check_drawable;
 
 /// Points read at a time.
 const PORTION: u64 = 4096;
@@ -40,6 +44,8 @@ pub struct MergeRequest {
     pub partial: bool,
     /// Whether a page is requested.
     pub page: bool,
+    /// Whether a drawing over the keys is requested.
+    pub landscape: bool,
 }
 
 /// Where the files go.
@@ -76,6 +82,8 @@ pub struct MergeReport {
     pub missing: String,
     /// The page, if one was requested.
     pub page: Option<String>,
+    /// The force over the keys, if its drawing was requested.
+    pub landscape: Option<Landscape>,
     /// The strongest design, of those that meet their limits where there are any.
     pub best: Option<StrongestDesign>,
 }
@@ -219,7 +227,7 @@ pub fn merge(
     let page = request
         .page
         .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
-    Ok(report(plan, summary, &gathered, page))
+    Ok(report(plan, request, summary, &gathered, page))
 }
 
 /// Writes the table of the designs on a front.
@@ -271,7 +279,8 @@ pub fn merge_table(
         let plot = plot(plan, &gathered.briefs, &fronts, among_met);
         page::html(plan, &summary, &plot, &gathered.briefs, &best)
     });
-    Ok((table, report(plan, summary, &gathered, page)))
+    let report = report(plan, request, summary, &gathered, page);
+    Ok((table, report))
 }
 
 /// Writes the table's rows in the points' order and collects what the fronts need.
@@ -478,14 +487,18 @@ fn count(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met:
 
 fn report(
     plan: &PlanFile,
+    request: &MergeRequest,
     summary: MergeSummary,
     gathered: &Gathered,
     page: Option<String>,
 ) -> MergeReport {
+    let best = StrongestDesign::of(plan, &gathered.briefs);
+    let landscape = || landscape::landscape(plan, &gathered.briefs, best.as_ref());
     MergeReport {
         summary,
         page,
-        best: StrongestDesign::of(plan, &gathered.briefs),
+        landscape: request.landscape.then(landscape),
+        best,
         missing: named(&gathered.missing),
     }
 }

@@ -5,7 +5,9 @@ use std::path::Path;
 use clap::Args;
 use serde::Serialize;
 
-use super::merge::{MergeFiles, MergeReport, MergeRequest, StrongestDesign, merge, merge_table};
+use super::merge::{
+    MergeFiles, MergeReport, MergeRequest, StrongestDesign, check_drawable, merge, merge_table,
+};
 use crate::RunError;
 use crate::bundle::atomic::check_distinct;
 use crate::bundle::sweep::MergeSummary;
@@ -18,7 +20,7 @@ use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{bytes, count, force, mass, si};
 use crate::cli::start::{begin, folder};
-use crate::cli::values::FileArgument;
+use crate::cli::values::{self, FileArgument};
 
 /// Join the points of a plan into one table, and plot the best designs
 ///
@@ -33,6 +35,7 @@ use crate::cli::values::FileArgument;
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
     ("fluxform sweep merge wires.json wires more --partial --out - > so_far.csv",
      "what there is so far, from two folders"),
+    ("fluxform sweep merge wires.json wires --out wires.csv --plot wires.png", "with a picture of the force over its keys"),
 ]))]
 pub struct Merge {
     /// Plan (JSON), `-` for standard input
@@ -50,6 +53,12 @@ pub struct Merge {
     /// Write a page with the result here (HTML)
     #[arg(long, value_name = "FILE")]
     report: Option<FileArgument>,
+    /// Draw the force over the plan's one key, or over its two (.svg, .png or .pdf)
+    ///
+    /// As a curve, or as a map of colours: hatched are designs that break a limit, white those that are
+    /// missing or cannot be computed; a star is the strongest within its limits.
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
 }
@@ -75,14 +84,13 @@ impl Merge {
             folders: self.folders.iter().map(folder).collect::<Result<_, _>>()?,
             partial: self.partial,
             page: self.report.is_some(),
+            landscape: self.plot.is_some(),
         };
-        if self.out == FileArgument::Standard && self.report.as_ref() == Some(&self.out) {
-            return Err(Failure::Usage(
-                "--out and --report cannot both go to standard output; give one of them a file"
-                    .to_owned(),
-            ));
-        }
+        self.one_stream()?;
         let (plan, input) = documents::plan(&self.plan)?;
+        if self.plot.is_some() {
+            check_drawable(&plan)?;
+        }
         let points = request.folders.iter();
         let points =
             points.flat_map(|folder| ["points", "plan.json"].map(|name| folder.join(name)));
@@ -91,14 +99,15 @@ impl Merge {
             outputs.extend(self.files(path).paths());
             protected.extend(outputs.iter().cloned());
         }
-        if let Some(FileArgument::Path(path)) = &self.report {
-            outputs.push(path.clone());
-        }
+        let drawn = [&self.report, &self.plot].map(Option::as_ref);
+        let files = drawn.iter().flatten().filter(|file| !file.is_standard());
+        outputs.extend(files.map(|file| file.as_given().to_path_buf()));
         check_distinct(&outputs).map_err(RunError::from)?;
-        let page =
-            (self.report.as_ref()).map(|file| Picture::new(file, self.writing.force, protected));
-        if let Some(page) = &page {
-            page.check(std::slice::from_ref(&input))?;
+        let [page, plot] = drawn.map(|file| {
+            file.map(|file| Picture::new(file, self.writing.force, protected.iter().cloned()))
+        });
+        for picture in [&page, &plot].into_iter().flatten() {
+            picture.check(std::slice::from_ref(&input))?;
         }
         let (report, mut place) = match &self.out {
             FileArgument::Standard => {
@@ -131,10 +140,10 @@ impl Merge {
             ));
         }
         if let (Some(page), Some(html)) = (&page, &report.page) {
-            let after = page.write(&report.summary.inputs, html, printer)?;
-            if after == Stream::Error {
-                place = after;
-            }
+            place = place.or(page.write(&report.summary.inputs, html, printer)?);
+        }
+        if let (Some(plot), Some(landscape)) = (&plot, &report.landscape) {
+            place = place.or(plot.draw(&report.summary.inputs, &landscape.drawing(), printer)?);
         }
         let json = MergeJson {
             summary: &report.summary,
@@ -143,6 +152,19 @@ impl Merge {
         };
         let json = printer.with_warnings(&json);
         printer.summary(place, &json, || self.text(&report))
+    }
+
+    /// Standard output takes one result.
+    fn one_stream(&self) -> Result<(), Failure> {
+        let streams = [Some(&self.out), self.report.as_ref(), self.plot.as_ref()];
+        let streams = streams.into_iter().flatten();
+        if streams.filter(|file| file.is_standard()).count() > 1 {
+            return Err(Failure::Usage(
+                "of --out, --report and --plot only one can go to standard output; give the others a file"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
     }
 
     fn files(&self, table: &Path) -> MergeFiles {

@@ -437,6 +437,19 @@ impl ArraySources {
         }
     }
 
+    /// The same at these currents of the drives, together one drive of one ampere.
+    ///
+    /// # Panics
+    /// When there are not as many currents as drives.
+    #[must_use]
+    pub fn at_currents(&self, currents_a: &[f64]) -> Self {
+        assert_eq!(currents_a.len(), self.drives);
+        let of_all = |moments: &[f64]| moments.iter().zip(currents_a).map(|(m, i)| m * i).sum();
+        let moments = self.moments.chunks_exact(self.drives);
+        let moments = moments.map(of_all).collect();
+        Self::of_dipoles(1, self.top_m, self.places.clone(), moments)
+    }
+
     /// Number of drives.
     #[must_use]
     pub fn drives(&self) -> usize {

@@ -274,6 +274,40 @@ impl ArrayPlot {
             .collect()
     }
 
+    /// Ends of the section along x and z, m.
+    #[must_use]
+    pub fn section_ends_m(&self) -> [[f64; 2]; 2] {
+        [0, 2].map(|axis| self.ends_m(axis))
+    }
+
+    /// Closed outlines of the coils and the steel in the section, x and z, m, each with its stroke.
+    #[must_use]
+    pub fn sections_m(&self) -> Vec<(&'static str, Vec<[f64; 2]>)> {
+        let solid = |part: &&Part| !matches!(part.role, Role::Workspace | Role::Magnet);
+        let outlines = |part: &Part| -> Vec<Vec<[f64; 2]>> {
+            if let Body::Outlines { section_m, .. } = &part.body {
+                return vec![section_m.clone()];
+            }
+            let [_, _, [low, high]] = part.body.ends_m();
+            let cuts = part.body.cut(self.section_y_m).into_iter();
+            cuts.map(|[from, to]| vec![[from, low], [to, low], [to, high], [from, high]])
+                .collect()
+        };
+        let parts = self.parts.iter().filter(solid);
+        let all = parts.flat_map(|part| {
+            let stroke = part.role.look().stroke;
+            outlines(part)
+                .into_iter()
+                .map(move |outline| (stroke, outline))
+        });
+        all.filter(|(_, outline)| outline.len() > 2)
+            .map(|(stroke, mut outline)| {
+                outline.push(outline[0]);
+                (stroke, outline)
+            })
+            .collect()
+    }
+
     fn has(&self, role: Role) -> bool {
         self.parts.iter().any(|part| part.role == role)
     }

@@ -6,10 +6,12 @@ pub mod array;
 pub mod curves;
 pub mod drawing;
 pub mod lambda;
+pub mod landscape;
 pub mod matrix;
 pub mod pareto;
 pub mod plane;
 pub mod replay;
+pub mod scan_fit;
 pub mod slices;
 
 use std::collections::HashSet;

@@ -4,37 +4,70 @@ use std::sync::Arc;
 
 use kuva::plot::{ColorMap, Heatmap, LegendShape, LinePlot};
 use kuva::render::figure::Figure;
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 
 use super::drawing::Drawing;
 use super::pareto::{extent, readable};
-use super::plane::{Cells, Together, rows, wide};
+use super::plane::{Cells, NOTHING, Together, colours, rows, wide};
 use super::replay::COILS;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [460.0, 400.0];
 /// Height of a panel's title, px.
 const TITLE_PX: u32 = 14;
+/// Width of a line over the colours, px.
+const LINE_PX: f64 = 1.0;
+/// Where there is no field: in steel or hardly off it.
+const STEEL: &str = "#c3c9cf";
 /// Panels beside each other.
 const COLUMNS: usize = 3;
 /// Colours of the largest negative value and of the largest positive one, which stay apart for the
 /// colour-blind; between them white, which is zero.
 const ENDS: [[f64; 3]; 2] = [[5.0, 48.0, 97.0], [178.0, 24.0, 43.0]];
 
+/// How values are coloured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shades {
+    /// Zero in the middle.
+    Signed,
+    /// By the logarithm of sizes, down to a thousandth of the largest.
+    Decades,
+}
+
+/// A line over the colours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SliceLine {
+    /// Places along both axes, m.
+    pub points_m: Vec<[f64; 2]>,
+    /// Its colour.
+    pub stroke: &'static str,
+}
+
+impl SliceLine {
+    /// The colour of a field line.
+    pub const FIELD: &str = "#ffffff";
+}
+
 /// Values on the nodes of a plane through the workspace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slice {
     /// The quantity, without its unit, and the place of the plane.
     pub title: [String; 2],
+    /// The SI unit.
+    pub unit: &'static str,
     /// Names of the axes, without their unit.
     pub axes: [&'static str; 2],
     /// Ends along the axes, m.
     pub ends_m: [[f64; 2]; 2],
     /// Nodes along the first axis, which is fastest.
     pub columns: usize,
-    /// N.
-    pub values_n: Vec<f64>,
+    /// In that unit; `None` where there is none.
+    pub values: Vec<Option<f64>>,
+    /// Their colours.
+    pub shades: Shades,
+    /// Lines over them.
+    pub lines: Vec<SliceLine>,
 }
 
 /// Values over height.
@@ -55,7 +88,7 @@ pub struct SlicesPlot {
     pub slices: Vec<Slice>,
     /// The quantity of the curves, without its unit.
     pub curves_title: String,
-    /// In the last panel.
+    /// In the last panel, if there are any.
     pub curves: Vec<HeightCurve>,
 }
 
@@ -63,20 +96,23 @@ impl SlicesPlot {
     /// The drawing.
     #[must_use]
     pub fn drawing(&self) -> Drawing {
-        let panels = self.slices.iter().map(slice).chain([self.curves()]);
+        let curves = (!self.curves.is_empty()).then(|| self.curves());
+        let panels = self.slices.iter().map(slice).chain(curves);
         let (plots, layouts): (Vec<_>, Vec<_>) = panels.unzip();
         let rows = plots.len().div_ceil(COLUMNS);
-        let legend =
-            self.curves.iter().enumerate().map(|(k, curve)| {
-                super::entry(&curve.name, COILS[k % COILS.len()], LegendShape::Line)
-            });
-        let figure = Figure::new(rows, plots.len().min(COLUMNS))
+        let mut figure = Figure::new(rows, plots.len().min(COLUMNS))
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(plots)
-            .with_layouts(layouts)
-            .with_shared_legend_bottom()
-            .with_shared_legend_entries(legend.collect());
+            .with_layouts(layouts);
+        if !self.curves.is_empty() {
+            let legend = self.curves.iter().enumerate().map(|(k, curve)| {
+                super::entry(&curve.name, COILS[k % COILS.len()], LegendShape::Line)
+            });
+            figure = figure
+                .with_shared_legend_bottom()
+                .with_shared_legend_entries(legend.collect());
+        }
         Drawing::new(figure.render())
     }
 
@@ -102,14 +138,25 @@ impl SlicesPlot {
 }
 
 fn slice(slice: &Slice) -> (Vec<Plot>, Layout) {
-    let (scale, unit) = readable(&slice.values_n, "N");
+    let values: Vec<f64> = slice.values.iter().flatten().copied().collect();
+    let (scale, unit) = readable(&values, slice.unit);
+    let largest = values
+        .iter()
+        .fold(0.0_f64, |most, v| most.max(scale * v.abs()));
+    let shown = |value: f64| match slice.shades {
+        Shades::Signed => scale * value,
+        Shades::Decades => (scale * value.abs()).max(1e-3 * largest).log10(),
+    };
     let cells = rows(&Cells {
         columns: slice.columns,
-        values: slice.values_n.iter().map(|v| Some(scale * v)).collect(),
+        values: slice.values.iter().map(|v| v.map(shown)).collect(),
         together: Together::Largest,
     });
     let [x, y] = slice.ends_m.map(|ends| wide(ends.map(|m| 1e3 * m)));
-    let colours = diverging(cells.iter().flatten().copied());
+    let colours = match slice.shades {
+        Shades::Signed => diverging(cells.iter().flatten().copied()),
+        Shades::Decades => steel_or(colours()),
+    };
     let heatmap = Heatmap::new()
         .with_data(cells)
         .with_color_map(colours)
@@ -126,7 +173,30 @@ fn slice(slice: &Slice) -> (Vec<Plot>, Layout) {
         .with_ticks(5)
         .with_equal_aspect();
     layout.show_colorbar = true;
-    (vec![Plot::Heatmap(heatmap)], layout)
+    if slice.shades == Shades::Decades {
+        layout = layout.with_colorbar_tick_format(TickFormat::Custom(Arc::new(power)));
+    }
+    let line = |line: &SliceLine| {
+        let points = line.points_m.iter().map(|[x, y]| (1e3 * x, 1e3 * y));
+        let drawn = LinePlot::new().with_data(points.collect::<Vec<_>>());
+        Plot::Line(drawn.with_color(line.stroke).with_stroke_width(LINE_PX))
+    };
+    let plots = std::iter::once(Plot::Heatmap(heatmap)).chain(slice.lines.iter().map(line));
+    (plots.collect(), layout)
+}
+
+/// `map`, and the colour of steel where there is nothing.
+fn steel_or(map: ColorMap) -> ColorMap {
+    ColorMap::Custom(Arc::new(move |share: f64| match share.is_nan() {
+        true => STEEL.to_owned(),
+        false => map.map(share),
+    }))
+}
+
+/// Ten to this power, to two digits.
+fn power(decades: f64) -> String {
+    let decimals = (1.0 - decades.floor()).max(0.0) as usize;
+    format!("{:.decimals$}", 10_f64.powf(decades))
 }
 
 /// Colours for values of both signs: white is zero, and equal sizes are equally strong. The crate hands
@@ -142,6 +212,9 @@ fn diverging(values: impl Iterator<Item = f64>) -> ColorMap {
 }
 
 fn colour(value: f64, most: f64) -> String {
+    if value.is_nan() {
+        return NOTHING.to_owned();
+    }
     let strength = if most > 0.0 {
         (value / most).clamp(-1.0, 1.0)
     } else {
@@ -164,7 +237,15 @@ mod tests {
                 axes: ["x", "y"],
                 ends_m: [[-0.05, 0.05], [-0.03, 0.07]],
                 columns: 7,
-                values_n: (0..35).map(|k| 0.01 * (f64::from(k) - 11.3)).collect(),
+                unit: "N",
+                values: (0..35)
+                    .map(|k| (k != 7).then_some(0.01 * (f64::from(k) - 11.3)))
+                    .collect(),
+                shades: Shades::Signed,
+                lines: vec![SliceLine {
+                    points_m: vec![[-0.03, 0.01], [0.02, 0.03]],
+                    stroke: SliceLine::FIELD,
+                }],
             }],
             curves_title: "above the axis".to_owned(),
             curves: vec![HeightCurve {

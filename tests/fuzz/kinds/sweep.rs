@@ -172,6 +172,7 @@ fn give_plan(input: &Input, folder: &Path) -> Result<bool, String> {
         folders: vec![out],
         partial: true,
         page: true,
+        landscape: false,
     };
     if plan.points < 100_000 {
         let entry = Entry::of_bytes(PLAN, bytes);
@@ -261,6 +262,7 @@ fn give_shard(input: &Input, folder: &Path) -> Result<bool, String> {
         folders: vec![PathBuf::from(folder).join("out")],
         partial: true,
         page: true,
+        landscape: false,
     };
     match merge_table(&plan, Entry::of_bytes(PLAN, bytes), &request, &Silent) {
         Err(error) => refusal(&error.to_string(), "000000.json"),

@@ -4,12 +4,13 @@ use clap::{Args, ValueEnum};
 
 use super::{Fitted, ScanRequest, compare};
 use crate::RunError;
-use crate::bundle::atomic::{self, Overwrite};
+use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::bundle::scan::{Explanation, FitFile, Left, ScanFile, ScanPlace};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, number, number_to, percent, si};
 use crate::cli::start::accuracy_check;
@@ -41,6 +42,9 @@ pub struct ScanFlags {
     /// The noise of measured gradients in T/m
     #[arg(long, hide_short_help = true, value_name = "G", value_parser = values::noise, requires = "compare")]
     noise_t_per_m: Option<f64>,
+    /// Draw measured over computed values, and the residuals beside their noise (.svg, .png or .pdf)
+    #[arg(long, hide_short_help = true, value_name = "FILE", value_parser = values::picture, requires = "compare", conflicts_with = "points")]
+    plot: Option<FileArgument>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -89,6 +93,16 @@ impl Probe {
         {
             overwrite.check(path).map_err(RunError::from)?;
         }
+        let plot = self.scan.plot.as_ref();
+        if let Some(out) = out {
+            table_or_drawing(out, plot)?;
+            check_distinct(plot.iter().chain([&out]).map(|file| file.as_given()))
+                .map_err(RunError::from)?;
+        }
+        let plot = plot.map(|file| Picture::new(file, self.writing.force, document.also_read()));
+        if let Some(plot) = &plot {
+            plot.check(&inputs)?;
+        }
         let bar = begin(printer);
         let request = self.scan.request(self.tolerance.tolerance);
         let report = compare(design, &scan, &name, inputs, &request, &bar)?;
@@ -109,6 +123,10 @@ impl Probe {
                 })
                 .map_err(RunError::from)?;
             }
+        }
+        if let Some(plot) = &plot {
+            let drawing = report.picture(&scan, &name).drawing();
+            place = place.or(plot.draw(&report.file.inputs, &drawing, printer)?);
         }
         let json = printer.with_warnings(&report.file);
         printer.summary(place, &json, || text(&report.file, &name, out))?;

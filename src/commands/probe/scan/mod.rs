@@ -26,6 +26,7 @@ mod explain;
 mod fit;
 mod keys;
 mod model;
+mod picture;
 pub(super) mod units;
 
 pub use fit::Fitted;
