@@ -472,3 +472,29 @@ fn regression_one_word_for_a_certificate_everywhere() {
     let table = place.run(&merge).ends(0).out;
     assert!(table.contains(",exhaustive,"), "{table}");
 }
+
+#[test]
+fn the_best_coil_is_drawn_among_those_around_it() {
+    let place = Place::new();
+    let run = |more: &[&str]| place.run(&[&["optimize", SEED], more].concat());
+    run(&["--plot", "best.svg"])
+        .ends(0)
+        .says(&["written: best.svg"]);
+    let svg = String::from_utf8(place.read("best.svg")).unwrap();
+    for text in [
+        "length / mm",
+        "outer diameter / mm",
+        "force on the magnet",
+        "hatched: breaks a limit",
+        "resistance",
+        "best coil",
+        "section of the array with it",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    run(&["--wound", "--plot", "wound.png"]).ends(0);
+    assert!(place.read("wound.png").starts_with(b"\x89PNG"));
+    run(&["--out", "-", "--plot", "-"])
+        .ends(2)
+        .says(&["only one can go to standard output"]);
+}

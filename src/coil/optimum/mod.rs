@@ -41,6 +41,7 @@ mod cored_tests;
 mod diagnosis;
 pub mod domain;
 pub mod interval_bounds;
+pub mod landscape;
 pub mod lazy_table;
 mod local_searches;
 pub mod model;

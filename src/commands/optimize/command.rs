@@ -130,28 +130,23 @@ impl Optimize {
             outputs.push(path);
             overwrite.check(path).map_err(RunError::from)?;
         }
-        let page = self.report.as_ref().map(|file| {
+        let drawn = [self.report.as_ref(), self.array.plot.as_ref()];
+        let [page, plot] = drawn.map(|file| {
             let written = outputs.iter().map(|path| path.to_path_buf());
-            Picture::new(
-                file,
-                self.writing.force,
-                protected.iter().cloned().chain(written),
-            )
+            let protected = protected.iter().cloned().chain(written);
+            file.map(|file| Picture::new(file, self.writing.force, protected))
         });
-        if let Some(page) = &page {
-            page.check(&inputs)?;
+        for picture in [&page, &plot].into_iter().flatten() {
+            picture.check(&inputs)?;
         }
-        outputs.extend(match &self.report {
-            Some(FileArgument::Path(path)) => Some(path),
-            Some(FileArgument::Standard) | None => None,
-        });
-        check_distinct(&outputs).map_err(RunError::from)?;
-        if self.out == Some(FileArgument::Standard) && self.report == self.out {
+        let files = self.out.iter().chain(drawn.into_iter().flatten());
+        if files.clone().filter(|file| file.is_standard()).count() > 1 {
             return Err(Failure::Usage(
-                "--out and --report cannot both go to standard output; give one of them a file"
+                "of --out, --report and --plot only one can go to standard output; give the others a file"
                     .to_owned(),
             ));
         }
+        check_distinct(files.map(FileArgument::as_given)).map_err(RunError::from)?;
         let bar = begin(printer);
         let source = Document {
             design: &document.design,
@@ -166,6 +161,9 @@ impl Optimize {
         let mut place = self.write(&result, &mark, &overwrite, printer)?;
         if let Some(page) = &page {
             place = place.or(page.write(&result.inputs, &page::html(&result), printer)?);
+        }
+        if let (Some(plot), Some(picture)) = (&plot, &result.picture) {
+            place = place.or(plot.draw(&result.inputs, &picture.drawing(), printer)?);
         }
         let json = printer.with_warnings(&result);
         printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))?;
@@ -191,6 +189,7 @@ impl Optimize {
             seed: self.seed,
             cells: self.certificate_cells,
             around: true,
+            landscape: self.array.plot.is_some(),
             tolerance: self.tolerance.tolerance,
         }
     }

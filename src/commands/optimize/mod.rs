@@ -6,6 +6,7 @@ mod design_document;
 mod model;
 mod no_coil;
 pub mod page;
+mod picture;
 mod result;
 mod text;
 
@@ -20,6 +21,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::circuit::Circuit;
 use crate::coil::limits::{LimitCheck, LimitName, bobbin_bore_m as bobbin_bore_m_of, by_key};
 use crate::coil::optimum::alternatives::alternatives;
+use crate::coil::optimum::landscape::{CoilLandscape, landscape};
 use crate::coil::optimum::neighbours::Neighbours;
 use crate::coil::optimum::problem::Task;
 use crate::coil::optimum::task::{self, Surroundings};
@@ -67,6 +69,8 @@ pub struct OptimizeRequest {
     pub cells: usize,
     /// Whether valley and alternatives are computed.
     pub around: bool,
+    /// Whether coils around the best one are computed, for a drawing.
+    pub landscape: bool,
     /// Allowed error of the best coil's evaluation.
     pub tolerance: Option<f64>,
 }
@@ -87,6 +91,7 @@ impl Default for OptimizeRequest {
             seed,
             cells,
             around: true,
+            landscape: false,
             tolerance: None,
         }
     }
@@ -113,7 +118,7 @@ pub fn optimize(
         task::of_design(design, fixed).map_err(|refused| RunError::Input(refused.to_string()))?;
     // Equation 11's own coil has any bore; one that is to be wound has that of a bobbin.
     task.bobbin = request.wound;
-    let outcome = search(design, &task, request, progress)?;
+    let (outcome, landscape) = search(design, &task, request, progress)?;
     let mut result = Optimization {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -143,6 +148,7 @@ pub fn optimize(
         accuracy: BTreeMap::new(),
         accuracy_reached: true,
         design_text: None,
+        picture: None,
         warnings: Vec::new(),
     };
     if let Some(best) = &outcome.best {
@@ -154,6 +160,7 @@ pub fn optimize(
         if surroundings(design, request.neighbours) == Surroundings::Neighbours {
             result.among_neighbours(&written.design, best, request.tolerance)?;
         }
+        result.picture = landscape.map(|around| picture::picture(&around, best, &written.design));
         result.design_text = Some(written.text);
     }
     result.take_given(given);
@@ -344,7 +351,7 @@ fn search(
     task: &Task,
     request: &OptimizeRequest,
     progress: &dyn Progress,
-) -> Result<Outcome, RunError> {
+) -> Result<(Outcome, Option<CoilLandscape>), RunError> {
     let model = model::coil_model(
         design,
         request.tolerance,
@@ -358,14 +365,20 @@ fn search(
         initial: design.coil.as_ref().map(Window::of_coil),
         valley: request.around,
     };
-    if request.wound {
-        return Ok(optimise_wound(model, task, &settings, progress)?);
+    let mut outcome = if request.wound {
+        optimise_wound(model, task, &settings, progress)?
+    } else {
+        optimise(model, task, &settings, progress)?
+    };
+    let best = outcome.best.as_ref();
+    let around = best.filter(|_| request.around && !request.wound);
+    let alternatives = around.map(|best| alternatives(model, task, best, progress));
+    let drawn = best.filter(|_| request.landscape);
+    let landscape = drawn.map(|best| landscape(model, task, best, progress));
+    if let Some(alternatives) = alternatives {
+        outcome.alternatives = alternatives?;
     }
-    let mut outcome = optimise(model, task, &settings, progress)?;
-    if let Some(best) = outcome.best.as_ref().filter(|_| request.around) {
-        outcome.alternatives = alternatives(model, task, best, progress)?;
-    }
-    Ok(outcome)
+    Ok((outcome, landscape.transpose()?))
 }
 
 /// The least bore of a bobbin, m, where a coil in the result is limited by it.

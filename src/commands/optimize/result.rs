@@ -12,6 +12,7 @@ use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::outcome::Violation;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{Certificate, Ending, LimitUse, Valley, WholeTurns, WireOutcome};
+use crate::plot::landscape::Landscape;
 use crate::scene::rated::{CircuitSummary, CoilSummary};
 
 /// The result of `optimize`; all SI.
@@ -76,6 +77,9 @@ pub struct Optimization {
     /// The design with the best coil, TOML.
     #[serde(skip)]
     pub design_text: Option<String>,
+    /// Coils around the best one, and its section; where they were requested.
+    #[serde(skip)]
+    pub picture: Option<Landscape>,
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,

@@ -65,6 +65,17 @@ pub struct Landscape {
     pub limits: Vec<LimitLine>,
     /// Place of the best, counted in values along the variables, and its name.
     pub best: Option<([f64; 2], String)>,
+    /// Drawn to scale beside it.
+    pub section: Option<Section>,
+}
+
+/// Closed outlines of a section.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// Above them.
+    pub title: String,
+    /// Colour and corners of each, x and z, m.
+    pub outlines: Vec<(&'static str, Vec<[f64; 2]>)>,
 }
 
 impl Landscape {
@@ -76,11 +87,14 @@ impl Landscape {
             None => self.curve(),
         };
         let entries = self.legend();
-        let figure = Figure::new(1, 1)
+        let section = self.section.as_ref().map(Section::panel);
+        let panels = std::iter::once((plots, layout)).chain(section);
+        let (plots, layouts): (Vec<_>, Vec<_>) = panels.unzip();
+        let figure = Figure::new(1, plots.len())
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
-            .with_plots(vec![plots])
-            .with_layouts(vec![layout])
+            .with_plots(plots)
+            .with_layouts(layouts)
             .with_shared_legend_bottom()
             .with_shared_legend_entries(entries);
         Drawing::new(figure.render())
@@ -254,7 +268,28 @@ impl Landscape {
     }
 }
 
-/// The best one's mark: a ring that is seen on any colour.
+impl Section {
+    fn panel(&self) -> (Vec<Plot>, Layout) {
+        let corners = || self.outlines.iter().flat_map(|(_, outline)| outline);
+        let ends = |axis: usize| {
+            let values: Vec<f64> = corners().map(|corner| 1e3 * corner[axis]).collect();
+            extent(&values)
+        };
+        let line = |(colour, outline): &(&'static str, Vec<[f64; 2]>)| {
+            let points = outline.iter().map(|[x, z]| (1e3 * x, 1e3 * z));
+            let line = LinePlot::new().with_data(points.collect::<Vec<_>>());
+            Plot::Line(line.with_color(*colour).with_stroke_width(LIMIT_PX))
+        };
+        let layout = Layout::new(ends(0), ends(1))
+            .with_title(self.title.clone())
+            .with_x_label("x / mm")
+            .with_y_label("z / mm")
+            .with_equal_aspect();
+        (self.outlines.iter().map(line).collect(), layout)
+    }
+}
+
+/// The best one's mark: a star that is seen on any colour.
 fn best(place: (f64, f64)) -> [Plot; 2] {
     [("#ffffff", BEST_PX + 1.5), (BEST, BEST_PX)].map(|(colour, size)| {
         let mark = ScatterPlot::new()
@@ -315,6 +350,10 @@ mod tests {
                     .collect(),
             }],
             best: Some(([2.0, 1.0], "best within its limits".to_owned())),
+            section: rows.map(|_| Section {
+                title: "best coil".to_owned(),
+                outlines: vec![("#8a4b08", vec![[0.01, 0.0], [0.02, 0.0], [0.02, -0.1]])],
+            }),
         }
     }
 
@@ -323,7 +362,13 @@ mod tests {
         for (rows, texts) in [
             (
                 Some(4),
-                vec!["hatched: breaks a limit", "length / mm", "resistance"],
+                vec![
+                    "hatched: breaks a limit",
+                    "length / mm",
+                    "resistance",
+                    "z / mm",
+                    "best coil",
+                ],
             ),
             (None, vec!["meets its limits", "breaks a limit"]),
         ] {

@@ -126,7 +126,8 @@ impl ReplayPlot<'_> {
         let layout = Layout::new(mm(0), mm(1))
             .with_title("seen from above")
             .with_x_label("x / mm")
-            .with_y_label("y / mm");
+            .with_y_label("y / mm")
+            .with_equal_aspect();
         (plots, layout)
     }
 

@@ -53,8 +53,11 @@ pub struct ArrayFlags {
     /// Write the trade-offs against mass, heat and settling here (CSV)
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
-    /// Draw them here, with what limits are worth (SVG, PNG or PDF)
-    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes", value_parser = values::picture)]
+    /// Draw them here, with what limits are worth (SVG, PNG or PDF); of one coil the force around it
+    ///
+    /// Without --for: the force over outer diameter and length at the best coil's bore, hatched where a
+    /// limit is broken, each limit where it is reached, and the section of the array of best coils.
+    #[arg(long, hide_short_help = true, value_name = "FILE", value_parser = values::picture)]
     pub plot: Option<FileArgument>,
     /// Keep every array that is computed in this file, and take from it those of an earlier run
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]

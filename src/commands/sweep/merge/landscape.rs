@@ -74,5 +74,6 @@ pub(super) fn landscape(
             let at = place(best.index).map(|k| k as f64);
             (at, named(best).to_owned())
         }),
+        section: None,
     }
 }
