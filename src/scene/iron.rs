@@ -180,11 +180,21 @@ impl SceneIron {
 
     /// Distance of a place from the nearest of it, m; below nothing inside.
     pub(super) fn distance_m(&self, place_m: Point) -> f64 {
-        let plate = self.plate.map(|plate| plate.body());
-        let bodies = self.bodies.iter().map(|(body, _)| *body).chain(plate);
+        let bodies = self.solids().into_iter();
         bodies.fold(f64::INFINITY, |least, body| {
             least.min(body.distance_m(place_m))
         })
+    }
+
+    /// The bodies, the plate among them.
+    #[must_use]
+    pub fn solids(&self) -> Vec<Body> {
+        let plate = self.plate.map(|plate| plate.body());
+        self.bodies
+            .iter()
+            .map(|(body, _)| *body)
+            .chain(plate)
+            .collect()
     }
 
     /// Warnings about steel above its knee, where linear steel ends.

@@ -19,6 +19,7 @@ pub fn trials() -> Vec<Trial> {
     trials! {
         None => [
             forces_and_field_for_paraview_are_the_bundles_own,
+            a_plate_is_drawn_below_its_coil,
             the_field_of_a_saturated_core_has_the_gradient_of_its_map,
         ],
         needs::vtk() => [the_library_of_paraview_reads_every_file],
@@ -186,6 +187,54 @@ fn forces_and_field_for_paraview_are_the_bundles_own() {
         }
     }
     place.run(&["verify", "out/air/bump"]).ends(0);
+}
+
+fn a_plate_is_drawn_below_its_coil() {
+    let one = TWO.replace("columns = 2", "columns = 1");
+    let plate =
+        "[plate]\nthickness_mm = 3.0\nx_mm = 90.0\ny_mm = 60.0\nrelative_permeability = 700.0\n";
+    let place = calibrated(&format!("{one}{plate}"));
+    let coils = VtkFile::read(&place.read("out/two/bump/vtk/coils.vtp"));
+    let places = coils.vectors("position_m");
+    let (mut area_m2, mut seen) = (0.0, 0);
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let mut start = 0;
+    for (cell, end) in coils.arrays["offsets"].iter().enumerate() {
+        let corners = &coils.arrays["connectivity"][start..*end as usize];
+        start = *end as usize;
+        if coils.arrays["part"][cell] != 2.0 {
+            continue;
+        }
+        assert_eq!(
+            (coils.arrays["coil"][cell], coils.arrays["current_a"][cell]),
+            (-1.0, 0.0)
+        );
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| places[corners[k] as usize]);
+        let [p, q]: [[f64; 3]; 2] =
+            [[a, c], [b, d]].map(|[from, to]| std::array::from_fn(|k| to[k] - from[k]));
+        let normal: [f64; 3] = std::array::from_fn(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            p[i] * q[j] - p[j] * q[i]
+        });
+        area_m2 += 0.5 * normal.iter().map(|part| part * part).sum::<f64>().sqrt();
+        for corner in [a, b, c, d] {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(corner[axis]);
+                high[axis] = high[axis].max(corner[axis]);
+            }
+        }
+        seen += 1;
+    }
+    assert!(seen > 100, "{seen}");
+    let expected = 2.0 * (0.09 * 0.06 + 0.003 * (0.09 + 0.06));
+    assert!((area_m2 / expected - 1.0).abs() < 1e-9, "{area_m2:e}");
+    let ends = [[-0.045, 0.045], [-0.03, 0.03], [-0.11, -0.107]];
+    for (axis, [from, to]) in ends.into_iter().enumerate() {
+        assert!(
+            (low[axis] - from).abs() < 1e-9 && (high[axis] - to).abs() < 1e-9,
+            "{low:?} {high:?}"
+        );
+    }
 }
 
 fn the_field_of_a_saturated_core_has_the_gradient_of_its_map() {

@@ -11,11 +11,13 @@ use crate::bundle::table::CurrentRow;
 use crate::bundle::vtk::{Array, PolyData, write_image, write_poly};
 use crate::commands::lambda::LambdaReport;
 use crate::commands::map::workspace_grid;
+use crate::field::iron::bodies::Body;
 use crate::map::Components;
 use crate::map::tabulate::Grid;
 use crate::progress::Progress;
 use crate::report::data::DirectionCell;
 use crate::scene::Scene;
+use crate::scene::iron::SceneIron;
 use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::working_point::{WorkingPoint, sum_of_coils};
 use crate::shape::points::ConstraintPoints;
@@ -25,6 +27,9 @@ const SIDES: usize = 48;
 /// Numbers of the parts in the coils' file.
 const WINDING: i64 = 0;
 const CORE: i64 = 1;
+const STEEL: i64 = 2;
+/// The coil of what belongs to none.
+const NO_COIL: i64 = -1;
 
 /// Names of the files in a bundle.
 const OBJECT: &str = "vtk/object.vtp";
@@ -133,7 +138,7 @@ fn column(cells: &[DirectionCell], pick: fn(&DirectionCell) -> [f64; 3]) -> Vec<
     cells.iter().flat_map(pick).collect()
 }
 
-/// Windings and cores with their coil's number and current.
+/// Windings and cores with their coil's number and current, and the plate and other steel.
 fn coils(out: &mut Vec<u8>, scene: &Scene, currents: &[CurrentRow]) -> io::Result<()> {
     let coil = &scene.coil;
     let [inner_m, outer_m] = [coil.inner_diameter_m, coil.outer_diameter_m].map(|d| 0.5 * d);
@@ -166,12 +171,32 @@ fn coils(out: &mut Vec<u8>, scene: &Scene, currents: &[CurrentRow]) -> io::Resul
             add(core, CORE);
         }
     }
+    for body in scene.iron.iter().flat_map(SceneIron::solids) {
+        faces(&mut poly, &body);
+    }
+    number.resize(poly.ends.len(), NO_COIL);
+    part.resize(poly.ends.len(), STEEL);
+    current_a.resize(poly.ends.len(), 0.0);
     let arrays = [
         Array::indices("coil", &number),
         Array::indices("part", &part),
         Array::numbers("current_a", 1, &current_a),
     ];
     write_poly(out, &poly, &[], &arrays)
+}
+
+/// The surface of a body, face by face.
+fn faces(poly: &mut PolyData, body: &Body) {
+    let first = poly.points_m.len();
+    poly.points_m.extend(body.places_m());
+    let side = Body::STEPS + 1;
+    for face in (first..poly.points_m.len()).step_by(side * side) {
+        let cells =
+            (0..Body::STEPS).flat_map(|v| (0..Body::STEPS).map(move |u| face + v * side + u));
+        for at in cells {
+            poly.push([at, at + 1, at + side + 1, at + side]);
+        }
+    }
 }
 
 /// The surface that a profile of radii and heights sweeps about an axis; one that does not close is
