@@ -17,7 +17,7 @@ use fluxform_numerics::vec3::{dot, minus, norm};
 
 /// Resolutions from coarse to fine: order, panels a turn, steps to an edge, panels along the largest
 /// body.
-const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
+pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
     (3, 4, 1, 5.0),
     (3, 4, 2, 6.0),
     (4, 4, 2, 7.0),
@@ -86,7 +86,7 @@ impl IronArray {
         Ok(coarse)
     }
 
-    /// Solves at one of the resolutions, 0 to 6.
+    /// Solves at one of the [`RESOLUTIONS`].
     ///
     /// # Errors
     /// A node on a winding's edge.
@@ -429,134 +429,5 @@ impl IronArray {
             }
         }
         Ok(peaks)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::bodies::{Coils, cuboid, mesh, tube};
-    use super::super::face::Face;
-    use super::*;
-    use std::f64::consts::PI;
-
-    /// The moment of bodies in a uniform field H along z, over H: -int v n dS.
-    fn moment_m3(bodies: &[Vec<Face>], chi: f64, tier: usize) -> f64 {
-        let nothing = Coils {
-            winding: Winding {
-                inner_radius_m: 0.3,
-                outer_radius_m: 0.7,
-                length_m: 1.1,
-                turns: 1.0,
-            },
-            positions_m: &[],
-            core: None,
-        };
-        let mut iron = Iron::new(nothing, None).expect("nothing is at fault");
-        for body in bodies {
-            iron = iron.with(body.clone(), chi);
-        }
-        let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
-        let system = System::new(&iron, &surface, &[[1.0, 1.0]]);
-        let heights = surface.nodes.iter().map(|node| -node.place_m[2]);
-        let potential = DMatrix::from_iterator(surface.size(), 1, heights);
-        let solved = system.solve(&[potential], 1e-9);
-        let nodes = surface.nodes.iter().zip(solved.layers[0].iter());
-        nodes.map(|(node, layer)| -layer * node.area_m2[2]).sum()
-    }
-
-    #[test]
-    fn a_sphere_has_its_moment_at_any_permeability() {
-        for chi in [1e-9, 0.7, 999.0, 1e9] {
-            let sphere = Face::ball([0.3, -0.1, 0.2], [0.7; 3]);
-            let moment = moment_m3(&[sphere], chi, 2);
-            let expected = 4.0 * PI * 0.343 * chi / (chi + 3.0);
-            assert!(
-                (moment / expected - 1.0).abs() < 1e-4,
-                "{chi}: {moment} {expected}"
-            );
-        }
-    }
-
-    /// V chi / (1 + N chi), N of a spheroid with c = 2 a: 0.1736.
-    #[test]
-    fn an_ellipsoid_has_its_demagnetising_factor() {
-        let eccentricity = 0.75_f64.sqrt();
-        let n = (1.0 - eccentricity.powi(2)) / eccentricity.powi(2)
-            * (eccentricity.atanh() / eccentricity - 1.0);
-        let chi = 300.0;
-        let moment = moment_m3(&[Face::ball([0.0; 3], [0.7, 0.7, 1.4])], chi, 2);
-        let expected = 4.0 / 3.0 * PI * 0.7 * 0.7 * 1.4 * chi / (1.0 + n * chi);
-        assert!(
-            (moment / expected - 1.0).abs() < 5e-4,
-            "{moment} {expected}"
-        );
-    }
-
-    /// Jackson 5.121: the moment of a shell, and the field inside it.
-    #[test]
-    fn a_spherical_shell_has_its_moment() {
-        let (inner, outer, mu) = (0.9_f64, 1.0_f64, 200.0_f64);
-        let mut shell = Face::ball([0.0; 3], [outer; 3]);
-        shell.extend(
-            Face::ball([0.0; 3], [inner; 3])
-                .into_iter()
-                .map(Face::turned),
-        );
-        let ratio = (inner / outer).powi(3);
-        let below = (2.0 * mu + 1.0) * (mu + 2.0) - 2.0 * ratio * (mu - 1.0).powi(2);
-        let alpha = (2.0 * mu + 1.0) * (mu - 1.0) / below * (outer.powi(3) - inner.powi(3));
-        let moment = moment_m3(&[shell], mu - 1.0, 2);
-        assert!((moment / (4.0 * PI * alpha) - 1.0).abs() < 1e-3, "{moment}");
-    }
-
-    /// A cube's polarisability by its mesh and by its faces.
-    #[test]
-    fn a_mesh_is_the_body_that_it_bounds() {
-        let chi = 50.0;
-        let faces = moment_m3(&[cuboid([1.0, 1.3, 0.8])], chi, 2);
-        let corner = |k: usize| -> Point {
-            [
-                0.5 * if k & 1 > 0 { 1.0 } else { -1.0 },
-                0.65 * if k & 2 > 0 { 1.0 } else { -1.0 },
-                0.4 * if k & 4 > 0 { 1.0 } else { -1.0 },
-            ]
-        };
-        let squares = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles: Vec<[Point; 3]> = squares
-            .iter()
-            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-            .map(|t| t.map(corner))
-            .collect();
-        // The diagonals alone are not sharp.
-        let sharp = |number: usize, side: usize| {
-            if number.is_multiple_of(2) {
-                side != 2
-            } else {
-                side != 0
-            }
-        };
-        let meshed = moment_m3(&[mesh(&triangles, 1.0, sharp)], chi, 1);
-        assert!((meshed / faces - 1.0).abs() < 2e-3, "{meshed} {faces}");
-    }
-
-    /// Two tubes end to end, apart by less and less, come to one.
-    #[test]
-    fn bodies_close_to_each_other_act_as_one() {
-        let half = |z: f64| {
-            let part = tube(0.3, 0.5, 1.0).into_iter();
-            part.map(|face| face.moved(|p| p, [0.0, 0.0, z]))
-                .collect::<Vec<Face>>()
-        };
-        let one = moment_m3(&[tube(0.3, 0.5, 2.0)], 20.0, 1);
-        let apart = |gap: f64| moment_m3(&[half(0.5 + 0.5 * gap), half(-0.5 - 0.5 * gap)], 20.0, 1);
-        let (near, far) = (apart(1e-3) / one, apart(1e-1) / one);
-        assert!(far < near && near < 1.0 && near > 0.97, "{near} {far}");
     }
 }

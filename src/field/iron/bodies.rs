@@ -202,12 +202,9 @@ impl Iron {
     pub fn new(coils: Coils<'_>, plate: Option<&Plate>) -> Result<Self, Fault> {
         let about = plate.map_or_else(|| middle(coils.positions_m), |plate| plate.centre_m);
         let mut iron = Self {
-            faces: Vec::new(),
-            centres_m: Vec::new(),
             planes_m: about,
             mirrors: [0, 1].map(|axis| is_mirrored(coils.positions_m, axis, about[axis])),
-            largest_m: 0.0,
-            top_m: f64::NEG_INFINITY,
+            ..Self::none()
         };
         let touching = match (coils.core, plate) {
             (Some((shape, _)), Some(plate)) => (shape.bottom_m - plate.top_m).abs() < SAME_M,
@@ -221,6 +218,19 @@ impl Iron {
             iron.add_cores(coils, shape, chi, foot);
         }
         Ok(iron)
+    }
+
+    /// No steel yet, and no coils.
+    #[must_use]
+    pub(super) fn none() -> Self {
+        Self {
+            faces: Vec::new(),
+            centres_m: Vec::new(),
+            planes_m: [0.0; 2],
+            mirrors: [false; 2],
+            largest_m: 0.0,
+            top_m: f64::NEG_INFINITY,
+        }
     }
 
     /// Adds a body of its own.

@@ -17,3 +17,4 @@ pub mod face;
 pub mod potential;
 pub mod surface;
 mod system;
+pub mod uniform;
