@@ -5,7 +5,7 @@ use super::core_material::{Material, SceneCore};
 use crate::RunError;
 use crate::design::iron::{Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::{Coupling, Design};
-use crate::field::iron::array::{IronArray, IronPeaks};
+use crate::field::iron::array::{IronArray, IronPeaks, Peak};
 use crate::field::iron::bodies::{Body, Coils, Iron, Outline, Plate, Solid, UPRIGHT};
 use crate::field::iron::face::Point;
 use crate::field::steel::CoreShape;
@@ -204,13 +204,11 @@ impl SceneIron {
             .core
             .as_ref()
             .map_or(f64::INFINITY, |core| core.knee_t);
-        let core_t = peaks
-            .cores
-            .iter()
-            .fold(0.0_f64, |most, (peak, _)| most.max(*peak));
-        let core = above_knee(core_t, of_core, &format!("a core of the array at {at}"));
+        let largest = |a: Peak, b: &Peak| if b.field_t > a.field_t { *b } else { a };
+        let core = peaks.cores.iter().fold(Peak::default(), largest);
+        let core = above_knee(core, of_core, &format!("a core of the array at {at}"));
         let plate = above_knee(
-            peaks.elsewhere.0,
+            peaks.elsewhere,
             self.knee_t,
             &format!("the plate or [[iron]] at {at}"),
         );
@@ -243,13 +241,24 @@ fn chi(steel: LinearSteel) -> f64 {
     steel.relative_permeability - 1.0
 }
 
-fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String> {
-    (peak_t > knee_t).then(|| {
-        format!(
-            "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as linear: the \
-             force will be smaller than stated; make the steel thicker, or lower the current"
-        )
-    })
+/// A sentence where the peak, or what its error allows, lies above the knee.
+fn above_knee(peak: Peak, knee_t: f64, whose: &str) -> Option<String> {
+    let (peak_t, error_t) = (peak.field_t, peak.error_t.unwrap_or(0.0));
+    let reaches = format!("{whose} reaches {peak_t:.2} T, +/- {error_t:.2} T,");
+    let advice = "make the steel thicker, or lower the current";
+    if peak_t > knee_t {
+        Some(format!(
+            "{reaches} above the steel's knee at {knee_t} T, but is taken as linear: the force will be smaller \
+             than stated; {advice}"
+        ))
+    } else if peak_t + error_t > knee_t {
+        Some(format!(
+            "{reaches} which may be above the steel's knee at {knee_t} T, but is taken as linear: a smaller \
+             --tolerance says more; {advice}"
+        ))
+    } else {
+        None
+    }
 }
 
 /// The least thickness of a body, m.
@@ -300,5 +309,26 @@ pub(super) fn body(iron: &Described) -> Body {
             [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
             [-sb, cb * sa, cb * ca],
         ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_warns_as_far_as_its_error_reaches() {
+        let said = |field_t, error_t| {
+            let peak = Peak {
+                field_t,
+                place_m: [0.0; 3],
+                error_t,
+            };
+            above_knee(peak, 1.5, "a plate")
+        };
+        assert_eq!(said(1.37, Some(0.1)), None);
+        assert!(said(1.37, Some(0.17)).unwrap().contains("may be above"));
+        let above = said(1.63, Some(0.17)).unwrap();
+        assert!(above.contains("1.63 T, +/- 0.17 T, above"), "{above}");
     }
 }

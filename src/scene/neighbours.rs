@@ -69,10 +69,22 @@ fn iron_summary(
                  has the coils among all steel";
     warnings.push(alone.to_owned());
     Some(IronSummary {
-        peak_field_t: peaks.elsewhere.0,
-        peak_at_m: peaks.elsewhere.1,
+        peak_field_t: peaks.elsewhere.field_t,
+        peak_at_m: peaks.elsewhere.place_m,
         knee_t: iron.knee_t,
         settling_s,
+    })
+}
+
+/// How sure the largest flux densities are: the worst of cores, plate and bodies.
+fn iron_accuracy(peaks: &IronPeaks) -> Option<StageAccuracy> {
+    let all = peaks.cores.iter().chain([&peaks.elsewhere]);
+    let relative = all.filter_map(|peak| Some(peak.error_t? / peak.field_t));
+    Some(StageAccuracy {
+        estimate: relative.reduce(f64::max)?,
+        relative_to: "the largest flux density of a core, or of the plate and [[iron]]".to_owned(),
+        method: "the difference from the next coarser panels, at the same place and of the largest"
+            .to_owned(),
     })
 }
 
@@ -156,7 +168,8 @@ pub(crate) fn array(
     }
     let iron = solved.iron_peaks(scene, &scene.upper_a)?;
     let iron = iron.and_then(|peaks| {
-        peak_t = peaks.cores.iter().map(|(peak, _)| *peak).collect();
+        peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
+        accuracy.extend(iron_accuracy(&peaks).map(|stage| ("iron_field", stage)));
         iron_summary(scene, slowest.settling_s(), &peaks, warnings)
     });
     let coils = axes

@@ -29,6 +29,8 @@ pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
 const MOST_ENTRIES: usize = 200_000_000;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
+/// Steps from the best node to the largest |B|.
+const CLIMBS: usize = 12;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
 
@@ -55,6 +57,8 @@ pub struct IronArray {
     pub relative_residual: f64,
     /// Applications of the matrices.
     pub iterations: usize,
+    /// The next coarser solution, by which errors are estimated; `None` of a resolution asked for.
+    coarser: Option<Box<Self>>,
 }
 
 impl IronArray {
@@ -78,6 +82,8 @@ impl IronArray {
             }
             let mut fine = Self::at_resolution(coils, iron, tolerance, tier)?;
             fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
+            coarse.coarser = None;
+            fine.coarser = Some(Box::new(coarse));
             coarse = fine;
             if coarse.relative_error <= tolerance {
                 break;
@@ -144,6 +150,7 @@ impl IronArray {
             relative_error: f64::NAN,
             relative_residual: solved.residual,
             iterations: solved.iterations,
+            coarser: None,
         };
         array.add_inductances(&firsts)?;
         Ok(array)
@@ -363,13 +370,25 @@ fn apart(a: Point, b: Point) -> f64 {
     norm(minus(a, b))
 }
 
-/// The largest |B| of every part of the steel, T, with their places, m.
+/// The largest |B| of a part of the steel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Peak {
+    /// |B|, T.
+    pub field_t: f64,
+    /// Where, m.
+    pub place_m: Point,
+    /// Estimated error, T: the difference from what the next coarser resolution has here or as its own
+    /// largest; nothing where there is no coarser one.
+    pub error_t: Option<f64>,
+}
+
+/// The largest |B| of every part of the steel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IronPeaks {
     /// In the core of every coil; empty without cores.
-    pub cores: Vec<(f64, Point)>,
+    pub cores: Vec<Peak>,
     /// In the rest.
-    pub elsewhere: (f64, Point),
+    pub elsewhere: Peak,
 }
 
 impl IronArray {
@@ -378,56 +397,145 @@ impl IronArray {
     /// # Errors
     /// A place on a winding's edge.
     pub fn peaks(&self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
-        let mut nodes: Vec<(Node, Option<usize>)> = Vec::new();
-        for image in &self.images {
+        let mut peaks = self.own_peaks(currents_a, depth_m)?;
+        let Some(coarser) = &self.coarser else {
+            return Ok(peaks);
+        };
+        let other = coarser.own_peaks(currents_a, depth_m)?;
+        let layers = coarser.layers_at(currents_a);
+        let compare = |peak: &mut Peak, other: &Peak| -> Result<(), OnEdge> {
+            let here = norm(coarser.field_of(peak.place_m, currents_a, &layers)?);
+            let apart = |value_t: f64| (peak.field_t - value_t).abs();
+            peak.error_t = Some(apart(here).max(apart(other.field_t)));
+            Ok(())
+        };
+        for (peak, other) in peaks.cores.iter_mut().zip(&other.cores) {
+            compare(peak, other)?;
+        }
+        if peaks.elsewhere.field_t > 0.0 {
+            compare(&mut peaks.elsewhere, &other.elsewhere)?;
+        }
+        Ok(peaks)
+    }
+
+    /// The same, without errors.
+    fn own_peaks(&self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
+        let mut nodes: Vec<Candidate> = Vec::new();
+        for (image, signs) in self.images.iter().enumerate() {
             nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
-                let of = |core| moved(&self.positions_m, core, *image, self.planes_m);
+                let of = |core| moved(&self.positions_m, core, *signs, self.planes_m);
                 let core = self.surface.face_of(number).bore.map(of);
-                (mirrored(node, *image, self.planes_m), core)
+                let node = mirrored(node, *signs, self.planes_m);
+                let normal = node.area_m2.map(|n| n / norm(node.area_m2));
+                Candidate {
+                    image,
+                    number,
+                    core,
+                    on_surface_m: node.place_m,
+                    place_m: inside(node.place_m, normal, depth_m),
+                }
             }));
         }
-        let inside: Vec<(Point, Option<usize>)> = nodes
-            .par_iter()
-            .filter_map(|(node, core)| {
-                let area = norm(node.area_m2);
-                let place: Point =
-                    std::array::from_fn(|i| node.place_m[i] - depth_m * node.area_m2[i] / area);
-                let far = |(other, _): &(Node, _)| apart(place, other.place_m) >= 0.98 * depth_m;
-                nodes.iter().all(far).then_some((place, *core))
-            })
-            .collect();
-        let mut sparse: Vec<(Point, Option<usize>)> = Vec::new();
-        for (place, core) in inside {
-            if sparse
-                .iter()
-                .all(|(other, _)| apart(place, *other) >= 0.5 * depth_m)
-            {
-                sparse.push((place, core));
+        let surface_m: Vec<Point> = nodes.iter().map(|node| node.on_surface_m).collect();
+        let deep = |place: Point| {
+            let far = |other: &Point| apart(place, *other) >= 0.98 * depth_m;
+            surface_m.iter().all(far)
+        };
+        let candidates: Vec<&Candidate> =
+            nodes.par_iter().filter(|node| deep(node.place_m)).collect();
+        let mut sparse: Vec<&Candidate> = Vec::new();
+        for candidate in candidates {
+            let far = |other: &&Candidate| apart(candidate.place_m, other.place_m) >= 0.5 * depth_m;
+            if sparse.iter().all(far) {
+                sparse.push(candidate);
             }
         }
         let layers = self.layers_at(currents_a);
+        let field_t = |place: Point| Ok(norm(self.field_of(place, currents_a, &layers)?));
         let values = sparse
             .par_iter()
-            .map(|(place, _)| Ok(norm(self.field_of(*place, currents_a, &layers)?)))
+            .map(|candidate| field_t(candidate.place_m))
             .collect::<Result<Vec<_>, OnEdge>>()?;
-        let cores = if nodes.iter().any(|(_, core)| core.is_some()) {
+        let cores = if nodes.iter().any(|node| node.core.is_some()) {
             currents_a.len()
         } else {
             0
         };
-        let mut peaks = IronPeaks {
-            cores: vec![(0.0, [0.0; 3]); cores],
-            elsewhere: (0.0, [0.0; 3]),
-        };
-        for ((place, core), value) in sparse.into_iter().zip(values) {
-            let most = match core {
-                Some(core) => &mut peaks.cores[core],
-                None => &mut peaks.elsewhere,
-            };
-            if value > most.0 {
-                *most = (value, place);
+        // The best of every core, then of the rest.
+        let mut best: Vec<Option<(f64, &Candidate)>> = vec![None; cores + 1];
+        for (candidate, value) in sparse.into_iter().zip(values) {
+            let of = &mut best[candidate.core.unwrap_or(cores)];
+            if of.is_none_or(|(most, _)| value > most) {
+                *of = Some((value, candidate));
             }
         }
-        Ok(peaks)
+        let climbed = best
+            .into_par_iter()
+            .map(|best| match best {
+                Some((value, from)) => self.climb(value, from, depth_m, &field_t, &deep),
+                None => Ok(Peak::default()),
+            })
+            .collect::<Result<Vec<Peak>, OnEdge>>()?;
+        Ok(IronPeaks {
+            elsewhere: climbed[cores],
+            cores: climbed[..cores].to_vec(),
+        })
     }
+
+    /// From a node's place to the largest |B| about it, along the surface at the same depth.
+    fn climb(
+        &self,
+        value_t: f64,
+        from: &Candidate,
+        depth_m: f64,
+        field_t: &impl Fn(Point) -> Result<f64, OnEdge>,
+        deep: &impl Fn(Point) -> bool,
+    ) -> Result<Peak, OnEdge> {
+        let face = self.surface.face_of(from.number);
+        let [[mut u, mut v], mut step] = self.surface.parameters(from.number);
+        let mut peak = Peak {
+            field_t: value_t,
+            place_m: from.place_m,
+            error_t: None,
+        };
+        for _ in 0..CLIMBS {
+            let before = peak.field_t;
+            let [du, dv] = step;
+            for [a, b] in [[u + du, v], [u - du, v], [u, v + dv], [u, v - dv]] {
+                if !(0.0..=1.0).contains(&a) || !(0.0..=1.0).contains(&b) {
+                    continue;
+                }
+                let (place_m, area_m2) = face.point(a, b);
+                let node = Node { place_m, area_m2 };
+                let node = mirrored(&node, self.images[from.image], self.planes_m);
+                let normal = node.area_m2.map(|n| n / norm(node.area_m2));
+                let place_m = inside(node.place_m, normal, depth_m);
+                if !deep(place_m) {
+                    continue;
+                }
+                let value = field_t(place_m)?;
+                if value > peak.field_t {
+                    (u, v) = (a, b);
+                    (peak.field_t, peak.place_m) = (value, place_m);
+                }
+            }
+            if peak.field_t == before {
+                step = step.map(|step| 0.5 * step);
+            }
+        }
+        Ok(peak)
+    }
+}
+
+/// A node, and the place below it where |B| is looked at.
+struct Candidate {
+    image: usize,
+    number: usize,
+    core: Option<usize>,
+    on_surface_m: Point,
+    place_m: Point,
+}
+
+fn inside(place_m: Point, normal: Point, depth_m: f64) -> Point {
+    std::array::from_fn(|i| place_m[i] - depth_m * normal[i])
 }

@@ -70,6 +70,23 @@ impl Surface {
         &self.faces[self.panels[node / (self.order * self.order)].face]
     }
 
+    /// A node's place in its face's parameters, and the distance of its neighbours in them.
+    pub(super) fn parameters(&self, node: usize) -> [[f64; 2]; 2] {
+        let own = self.order * self.order;
+        let [u0, u1, v0, v1] = self.panels[node / own].range;
+        let nodes = &gauss::rule(self.order).nodes;
+        let at = |from: f64, to: f64, k: usize| from + 0.5 * (to - from) * (1.0 + nodes[k]);
+        let within = node % own;
+        let place = [
+            at(u0, u1, within / self.order),
+            at(v0, v1, within % self.order),
+        ];
+        [
+            place,
+            [u1 - u0, v1 - v0].map(|side| side / self.order as f64),
+        ]
+    }
+
     /// Adds to `row` what the layer of every node gives at `target_m`:
     /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
     pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
