@@ -211,6 +211,57 @@ fn regression_a_png_of_the_trade_offs_held_svg() {
     place.run(&search(&["--plot", "front.jpeg"])).ends(2);
 }
 
+/// A page whose drawings are in its text: two arrays in two views, three trade-offs.
+#[test]
+fn the_page_shows_both_arrays_without_scripts() {
+    let place = Place::new();
+    let result = place
+        .run(&search(&["--report", "page.html"]))
+        .ends(0)
+        .json();
+    let page = String::from_utf8(place.read("page.html")).expect("text");
+    let gain = format!("{:.3}", number(&result, "gain"));
+    assert!(page.contains(&format!("Felt {gain} times")), "{gain}");
+    assert_eq!(page.matches("<svg class=\"array\"").count(), 2 * 2 + 3);
+    assert!(!page.contains("class=\"draw\"") && !page.contains("<noscript>"));
+    for said in [
+        "As given",
+        "ohm more of resistance",
+        "nothing is proven",
+        "within 1 %",
+    ] {
+        assert!(page.contains(said), "{said}");
+    }
+    place.run(&search(&["--report", "-", "--out", "-"])).ends(2);
+}
+
+/// Every choice of layout is reported with its best array, and is a row of the trade-off over coils.
+#[test]
+fn choices_are_reported_with_the_gain_of_each() {
+    let place = Place::new();
+    let result = place
+        .run(&search(&[
+            "--vary",
+            "array.columns=2,3",
+            "--front",
+            "trade.csv",
+        ]))
+        .ends(0)
+        .json();
+    let choices = result["choices"].as_array().unwrap();
+    let coils: Vec<f64> = choices.iter().map(|one| number(one, "coils")).collect();
+    assert_eq!(coils.iter().sum::<f64>(), 6.0 + 9.0);
+    assert!(number(&choices[0], "objective") >= number(&choices[1], "objective"));
+    let table = String::from_utf8(place.read("trade.csv")).expect("text");
+    assert_eq!(
+        table
+            .lines()
+            .filter(|row| row.starts_with("coils,"))
+            .count(),
+        2
+    );
+}
+
 #[test]
 fn an_earlier_run_is_taken_up_and_threads_do_not_matter() {
     let place = Place::new();

@@ -1,5 +1,9 @@
 //! The search itself: every choice begins, the better half goes on, the best is made at full accuracy.
 
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
 use fluxform_base::progress::Interrupted;
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Search, Settings};
@@ -64,6 +68,50 @@ impl Candidate {
     }
 }
 
+/// A choice of layout, magnet and core, and the best array of it that was computed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchedChoice {
+    /// Coils of the array.
+    pub coils: usize,
+    /// Rows and columns; null where the positions are the design's own.
+    pub rows_columns: Option<[usize; 2]>,
+    /// How they lie; null where that is as given.
+    pub layout: Option<&'static str>,
+    /// Diameter and length of the magnet, m.
+    pub magnet_m: [f64; 2],
+    /// Whether there are cores.
+    pub core: bool,
+    /// Arrays of it that were computed.
+    pub evaluations: usize,
+    /// The largest objective within the limits, at the accuracy of the search; null where none was met.
+    pub objective: Option<f64>,
+    /// The array, by key.
+    pub values: BTreeMap<String, f64>,
+}
+
+impl SearchedChoice {
+    fn of(problem: &ArrayProblem, search: &Search) -> Self {
+        let space = &problem.space;
+        let best = search.best();
+        let values = best.as_ref().map_or_else(BTreeMap::new, |(sample, _)| {
+            let keys = space.axes().iter().map(|axis| axis.key());
+            keys.zip(space.made(&sample.x)).collect()
+        });
+        let met = best.filter(|(_, judged)| judged.excess() <= MET);
+        let magnet = &space.base().magnet;
+        Self {
+            coils: space.coils(),
+            rows_columns: space.layout().map(|(_, counts)| counts),
+            layout: space.layout().map(|(layout, _)| layout.into()),
+            magnet_m: [magnet.diameter_m, magnet.length_m],
+            core: space.base().core.is_some(),
+            evaluations: search.samples().len(),
+            objective: met.map(|(_, judged)| judged.objective().exp()),
+            values,
+        }
+    }
+}
+
 /// The result of a search.
 pub struct Found<'a> {
     /// The problem of the best choice.
@@ -74,8 +122,8 @@ pub struct Found<'a> {
     pub best: Candidate,
     /// Evaluations of all choices.
     pub evaluations: usize,
-    /// Choices that were searched.
-    pub choices: usize,
+    /// Every choice that was searched.
+    pub choices: Vec<SearchedChoice>,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -172,6 +220,7 @@ pub fn run<'a>(
         .map(|(index, problem)| (index, Search::new(problem, settings)))
         .collect();
     let mut evaluations = 0;
+    let mut choices = Vec::new();
     let mut interrupted = false;
     // The better half goes on with twice as many evaluations each.
     while going.len() > 1 && !interrupted {
@@ -191,7 +240,10 @@ pub fn run<'a>(
                 .map_or(f64::NEG_INFINITY, |(_, judged)| judged.merit())
         };
         going.sort_by(|a, b| merit(&b.1).total_cmp(&merit(&a.1)).then(a.0.cmp(&b.0)));
-        going.truncate(going.len().div_ceil(2));
+        let left_out = going.split_off(going.len().div_ceil(2));
+        let searched = left_out.iter().rev();
+        choices
+            .extend(searched.map(|(index, search)| SearchedChoice::of(&problems[*index], search)));
     }
     let Some((index, mut search)) = going.into_iter().next() else {
         return Ok(None);
@@ -211,12 +263,14 @@ pub fn run<'a>(
         best.x = problem.space.made(&best.x);
     }
     evaluations += search.samples().len() - before;
+    choices.push(SearchedChoice::of(problem, &search));
+    choices.reverse();
     Ok(best.map(|best| Found {
         problem,
         search,
         best,
         evaluations,
-        choices: problems.len(),
+        choices,
         interrupted,
     }))
 }

@@ -384,6 +384,21 @@ impl Space {
         &self.axes
     }
 
+    /// The given design with this choice's magnet and core.
+    pub(super) fn base(&self) -> &Design {
+        &self.base
+    }
+
+    /// Coils of the array.
+    pub(super) fn coils(&self) -> usize {
+        self.unit.len()
+    }
+
+    /// How the coils lie, with rows and columns; `None` for the design's own positions.
+    pub(super) fn layout(&self) -> Option<(SearchLayout, [usize; 2])> {
+        self.layout
+    }
+
     /// Their ranges.
     #[must_use]
     pub fn variables(&self) -> &[Variable] {

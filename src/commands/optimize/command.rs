@@ -71,7 +71,7 @@ pub struct Optimize {
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
     /// Write a page with the result here (HTML); `-` is standard output
-    #[arg(long, value_name = "FILE", conflicts_with = "shapes")]
+    #[arg(long, value_name = "FILE")]
     report: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
@@ -114,6 +114,7 @@ impl Optimize {
                 starts: self.starts,
                 seed: self.seed,
                 out: self.out.as_ref(),
+                report: self.report.as_ref(),
                 force: self.writing.force,
                 tolerance: self.tolerance.tolerance,
             };

@@ -494,7 +494,7 @@ impl Side {
 }
 
 /// Round values within `ends`, m.
-fn ticks(ends: [f64; 2]) -> Vec<f64> {
+pub(super) fn ticks(ends: [f64; 2]) -> Vec<f64> {
     let rough = (ends[1] - ends[0]) / TICKS;
     let decade = 10_f64.powf(rough.log10().floor());
     let fits = |factor: &f64| factor * decade >= rough;

@@ -5,11 +5,16 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
+use super::array::ticks;
 use super::drawing::Drawing;
 use super::thinned;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [400.0, 380.0];
+/// The same on a page, with its space left and below, and around.
+const MARKUP_PX: [f64; 2] = [400.0, 300.0];
+const MARGIN_PX: [f64; 2] = [50.0, 44.0];
+const AROUND_PX: f64 = 12.0;
 /// Colours that stay apart for the colour-blind and in print.
 const MET: &str = "#0072b2";
 const UNMET: &str = "#b5b5b5";
@@ -68,8 +73,80 @@ impl DrawnPanel {
     /// Of the axes.
     #[must_use]
     pub fn labels(&self) -> [String; 2] {
-        std::array::from_fn(|k| format!("{} / {}", self.names[k], self.units[k]))
+        std::array::from_fn(|k| match self.units[k].as_str() {
+            "" => self.names[k].to_owned(),
+            unit => format!("{} / {unit}", self.names[k]),
+        })
     }
+
+    /// The panel as markup for a page, whose style has the colours.
+    #[must_use]
+    pub fn markup(&self) -> String {
+        let [x, y] = self.ranges;
+        let [width, height] = MARKUP_PX;
+        let [left, bottom] = [MARGIN_PX[0], height - MARGIN_PX[1]];
+        let place = |(a, b): (f64, f64)| {
+            let across = (a - x.0) / (x.1 - x.0) * (width - MARGIN_PX[0] - AROUND_PX);
+            let up = (b - y.0) / (y.1 - y.0) * (bottom - 2.0 * AROUND_PX);
+            (left + across, bottom - up)
+        };
+        let [x_label, y_label] = self.labels();
+        let mut svg = format!(
+            "<svg class=\"array\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{y_label} over {x_label}\">"
+        );
+        let mut text = |x: f64, y: f64, class: &str, text: &str| {
+            svg.push_str(&format!(
+                "<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"{class}\">{text}</text>"
+            ));
+        };
+        text(8.0, 14.0, "", &y_label);
+        text(0.5 * (left + width), height - 6.0, "middle", &x_label);
+        let mut rules = String::new();
+        for value in ticks([x.0, x.1]) {
+            let (at, _) = place((value, y.0));
+            text(at, bottom + 18.0, "middle", &short(value));
+            rules += &format!("M{at:.1} {bottom}v5");
+        }
+        for value in ticks([y.0, y.1]) {
+            let (_, at) = place((x.0, value));
+            text(left - 8.0, at + 4.0, "end", &short(value));
+            rules += &format!("M{left} {at:.1}h-5");
+        }
+        let right = width - AROUND_PX;
+        rules += &format!("M{left} {:.1}V{bottom}H{right}", 2.0 * AROUND_PX);
+        svg.push_str(&format!("<path class=\"rule\" d=\"{rules}\"/>"));
+        let kinds = [(&self.unmet, "dim", 2.0), (&self.met, "dot", 2.5)];
+        let line: Vec<String> = self
+            .front
+            .iter()
+            .map(|point| place(*point))
+            .map(|(x, y)| format!("{x:.1} {y:.1}"))
+            .collect();
+        for (points, class, radius) in kinds.into_iter().chain([(&self.front, "best", 3.5)]) {
+            if class == "best" && !line.is_empty() {
+                svg.push_str(&format!(
+                    "<path class=\"best-line\" d=\"M{}\"/>",
+                    line.join("L")
+                ));
+            }
+            for point in points {
+                let (x, y) = place(*point);
+                svg.push_str(&format!(
+                    "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}, {}</title></circle>",
+                    short(point.0),
+                    short(point.1)
+                ));
+            }
+        }
+        svg.push_str("</svg>");
+        svg
+    }
+}
+
+/// A number of four digits at most.
+fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    format!("{rounded}")
 }
 
 impl ParetoPlot {

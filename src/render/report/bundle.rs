@@ -6,12 +6,13 @@ use fluxform_bundle::lambda_file::LambdaFile;
 use fluxform_bundle::manifest::LeftOut;
 use serde_json::{Map, Value, json};
 
+use super::array::views;
 use super::data::{CalibratedObject, DrivenCoil};
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
 use super::{directions, error_budget, field, limits, path, surface, uncertainty};
-use crate::plot::array::{ArrayPlot, View};
+use crate::plot::array::ArrayPlot;
 
 /// The page.
 #[must_use]
@@ -145,26 +146,14 @@ fn answer(object: &CalibratedObject) -> Section {
 /// The array from above and in section, where scripts are off too.
 fn array(plot: &ArrayPlot) -> Section {
     let mut body = Html::default();
-    body.raw("<p class=\"key\">");
-    for (name, class) in plot.legend() {
-        body.raw(&format!("<svg class=\"array swatch\" viewBox=\"0 0 14 10\"><rect class=\"{class}\" width=\"14\" height=\"10\"/></svg>"))
-            .text(name)
-            .raw(" ");
-    }
-    body.raw("</p><div class=\"pair\">");
-    for (view, caption) in [
-        (View::Plan, "The array from above; numbers are the coils'."),
-        (
-            View::Section,
+    views(
+        &mut body,
+        plot,
+        [
+            "The array from above; numbers are the coils'.",
             "Cut along the row next to the middle, the magnet at the target height.",
-        ),
-    ] {
-        body.raw("<figure>")
-            .raw(&plot.markup(view))
-            .element("figcaption", caption)
-            .raw("</figure>");
-    }
-    body.raw("</div>");
+        ],
+    );
     Section {
         id: "array",
         title: "Array",

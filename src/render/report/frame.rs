@@ -87,14 +87,19 @@ impl Page {
             ));
             html.raw(&section.body.finish()).raw("\n</section>\n");
         }
+        // A page whose drawings are in its text says nothing of scripts.
+        let without_scripts = match &self.data {
+            Value::Object(data) if data.is_empty() => "",
+            _ => {
+                "<noscript><p class=\"note\">The drawings need JavaScript; every number stands in \
+                 the tables, and the drawings as SVG in the folder plots.</p></noscript>\n"
+            }
+        };
         html.raw("</main>\n<footer>")
             .text(&self.foot)
             .raw("</footer>\n<div id=\"tip\" hidden></div>\n")
             .raw("<p id=\"say\" class=\"hide\" aria-live=\"polite\"></p>\n")
-            .raw(
-                "<noscript><p class=\"note\">The drawings need JavaScript; every number stands in \
-                 the tables, and the drawings as SVG in the folder plots.</p></noscript>\n",
-            )
+            .raw(without_scripts)
             .raw("<script type=\"application/json\" id=\"data\">")
             .raw(&in_script(&self.data))
             .raw("</script>\n<script>")

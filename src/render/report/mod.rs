@@ -4,6 +4,7 @@
 //! security policy names both by their digests. Every text that comes from an input is escaped
 //! ([`html`]). The same data give the same bytes.
 
+pub mod array;
 pub mod bundle;
 pub mod bundle_files;
 pub mod data;

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::physics::{ArrayPhysics, Constant, Journal};
-use super::{ArrayEnding, ArrayRequest, optimize_array, tables, text};
+use super::{ArrayEnding, ArrayRequest, optimize_array, page, tables, text};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
@@ -76,6 +76,8 @@ pub struct Shared<'a> {
     pub seed: u64,
     /// Where the best design goes.
     pub out: Option<&'a FileArgument>,
+    /// Where the page goes.
+    pub report: Option<&'a FileArgument>,
     /// Whether existing files are replaced.
     pub force: bool,
     /// Allowed error.
@@ -121,16 +123,23 @@ impl ArrayFlags {
             self.front.as_ref(),
             self.plot.as_ref(),
             self.journal.as_ref(),
+            shared.report,
         ];
+        let streams = files.iter().flatten().filter(|file| file.is_standard());
+        if streams.count() > 1 {
+            let wrong = "only one of --out, --front, --plot, --journal and --report can go to standard output (-)";
+            return Err(Failure::Usage(wrong.to_owned()));
+        }
         let paths = files.into_iter().flatten().filter_map(|file| match file {
             FileArgument::Path(path) => Some(path),
             FileArgument::Standard => None,
         });
         check_distinct(paths.collect::<Vec<_>>()).map_err(RunError::from)?;
-        let plot = self.plot.as_ref();
-        let plot = plot.map(|file| Picture::new(file, shared.force, document.also_read()));
-        if let Some(plot) = &plot {
-            plot.check(&inputs)?;
+        let picture = |file| Picture::new(file, shared.force, document.also_read());
+        let plot = self.plot.as_ref().map(picture);
+        let report = shared.report.map(picture);
+        for picture in [&plot, &report].into_iter().flatten() {
+            picture.check(&inputs)?;
         }
         // The head of the table is its mark.
         let of_table = Overwrite::beginning(shared.force, tables::HEAD, &inputs[..1])
@@ -176,11 +185,15 @@ impl ArrayFlags {
             printer,
         )?;
         let worths = result.study.as_ref().map_or_else(Vec::new, text::worths);
-        let drawn = match (&plot, tables::drawing(&result, &worths)) {
-            (Some(plot), Some(drawing)) => plot.draw(&result.inputs, &drawing, printer)?,
+        let drawn = match (&plot, tables::pareto(&result, &worths)) {
+            (Some(plot), Some(pareto)) => plot.draw(&result.inputs, &pareto.drawing(), printer)?,
             _ => Stream::Output,
         };
-        if [front, drawn].contains(&Stream::Error) {
+        let paged = match &report {
+            Some(report) => report.write(&result.inputs, &page::html(&result), printer)?,
+            None => Stream::Output,
+        };
+        if [front, drawn, paged].contains(&Stream::Error) {
             place = Stream::Error;
         }
         let json = printer.with_warnings(&result);

@@ -1,6 +1,7 @@
 //! `optimize --for`: the array that is felt best over given shapes.
 
 pub(crate) mod command;
+mod page;
 pub(crate) mod physics;
 mod result;
 pub(crate) mod tables;
@@ -23,6 +24,7 @@ use crate::design::{Design, Need};
 use crate::numerics::mixed_search::{MET, Settings};
 use crate::progress::{Interrupted, Progress};
 use crate::scene::Scene;
+use crate::scene::drawing::drawing;
 use crate::scene::sources::ShapeSource;
 
 /// The options of [`optimize_array`].
@@ -217,8 +219,9 @@ fn result(
         levels: levels(physics, document.design, (before, found))?,
         evaluations: found.evaluations,
         history: history(found),
-        choices: found.choices,
+        choices: found.choices.clone(),
         seed: request.settings.seed,
+        drawn: [document.design, &best].map(drawing),
         design_text,
         warnings,
     })

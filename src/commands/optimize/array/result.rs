@@ -6,8 +6,10 @@ use serde::Serialize;
 
 use super::physics::Constant;
 use crate::bundle::artefact::Input;
+use crate::coil::array_search::search::SearchedChoice;
 use crate::coil::array_search::study::Study;
 use crate::coil::limits::LimitCheck;
+use crate::plot::array::ArrayPlot;
 
 /// The result; all SI.
 #[derive(Debug, Clone, Serialize)]
@@ -50,10 +52,13 @@ pub struct ArrayOptimization {
     /// The best gain so far by the number of arrays computed, each time it grew, at the accuracy of the
     /// search and of the choice that was best.
     pub history: Vec<Improvement>,
-    /// Choices of layout, magnet and core that were searched.
-    pub choices: usize,
+    /// Choices of layout, magnet and core that were searched, the best first.
+    pub choices: Vec<SearchedChoice>,
     /// Where the sequence of designs begins.
     pub seed: u64,
+    /// The given array and the best one, as drawings.
+    #[serde(skip)]
+    pub drawn: [Option<ArrayPlot>; 2],
     /// The best design, TOML.
     #[serde(skip)]
     pub design_text: String,

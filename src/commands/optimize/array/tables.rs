@@ -3,7 +3,6 @@
 use super::ArrayOptimization;
 use crate::coil::array_search::study::TRADED;
 use crate::coil::limits::LimitName;
-use crate::plot::drawing::Drawing;
 use crate::plot::pareto::{Panel, ParetoPlot};
 
 /// How the table begins.
@@ -12,7 +11,8 @@ pub const HEAD: &str = "quantity,value,gain";
 /// Worths of limits that fit above the panels.
 const WORTHS: usize = 2;
 
-/// One row a point: quantity, its value, the gain, and every variable.
+/// One row a point: quantity, its value, the gain, and every variable; for each choice of layout, magnet
+/// and core one of the number of coils.
 pub fn csv(result: &ArrayOptimization) -> String {
     let points = result.study.as_ref().map_or(&[][..], |study| &study.front);
     let keys: Vec<&str> = result.values.keys().map(String::as_str).collect();
@@ -33,12 +33,28 @@ pub fn csv(result: &ArrayOptimization) -> String {
             values.join(",")
         ));
     }
+    for choice in &result.choices {
+        let value = |key: &&str| {
+            choice
+                .values
+                .get(*key)
+                .map_or_else(String::new, f64::to_string)
+        };
+        let values: Vec<String> = keys.iter().map(value).collect();
+        if let Some(gain) = choice.objective {
+            text.push_str(&format!(
+                "coils,{},{gain},{}\n",
+                choice.coils,
+                values.join(",")
+            ));
+        }
+    }
     text
 }
 
 /// Gain against mass, heat and settling of the whole array, and above them the `worths` of limits; `None`
 /// where these were not studied.
-pub fn drawing(result: &ArrayOptimization, worths: &[String]) -> Option<Drawing> {
+pub fn pareto(result: &ArrayOptimization, worths: &[String]) -> Option<ParetoPlot> {
     let study = result.study.as_ref()?;
     let panel = |cost: usize| {
         let (_, name): (_, LimitName) = TRADED[cost];
@@ -54,7 +70,7 @@ pub fn drawing(result: &ArrayOptimization, worths: &[String]) -> Option<Drawing>
             front: study.on_front[cost].clone(),
         }
     };
-    let plot = ParetoPlot {
+    Some(ParetoPlot {
         title: std::iter::once(format!("{}: gain against cost", result.design))
             .chain(worths.iter().take(WORTHS).cloned())
             .collect::<Vec<_>>()
@@ -69,6 +85,5 @@ pub fn drawing(result: &ArrayOptimization, worths: &[String]) -> Option<Drawing>
         limits_met: study.designs.iter().map(|design| design.met).collect(),
         front: "computed arrays that no other one beats",
         panels: std::array::from_fn(panel),
-    };
-    Some(plot.drawing())
+    })
 }

@@ -58,7 +58,8 @@ pub fn summary(
     sheet.finish()
 }
 
-fn ended(result: &ArrayOptimization) -> String {
+/// How it ended, and how sure it is.
+pub fn ended(result: &ArrayOptimization) -> String {
     let searched = format!(
         "best of {} over {} that were computed; nothing is proven",
         count(result.certificate.starts.max(1), "descent"),
@@ -87,7 +88,7 @@ fn worth(sheet: &mut Sheet, study: &Study) {
 }
 
 /// What a step more of a limit would give.
-fn one_more(limit: &LimitWorth) -> String {
+pub fn one_more(limit: &LimitWorth) -> String {
     let (unit, per_si) = match limit.name {
         Some(name) => name.limit().step,
         None if limit.key.ends_with("_m") => ("mm", 1e3),
