@@ -69,6 +69,9 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     place
         .run(&["calibrate", "best.toml", FLAT, "--no-report"])
         .ends(0);
+    // The independent route: no tables, no telescoping, the duality gap from the points.
+    let bundle = "results/seed_air_array/flat";
+    place.run(&["verify", bundle]).ends(0);
 }
 
 /// Two cored coils: the pattern of opposite currents settles more slowly than a coil alone.
@@ -291,4 +294,125 @@ fn what_cannot_be_searched_is_said_before_anything_is_computed() {
             .ends(3);
         assert!(run.err.contains(said), "{vary}: {}", run.err);
     }
+    let twice = ["--vary", "array.columns=2,3", "--vary", "array.columns=3,4"];
+    let run = place
+        .run(&[&["optimize", SEED, "--for", FLAT][..], &twice].concat())
+        .ends(2);
+    assert!(run.err.contains("given twice"), "{}", run.err);
+    // Limits that contradict each other: named, with the nearest design.
+    let text = place
+        .text(SEED)
+        .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 5e-4");
+    place.write("tight.toml", &text);
+    let run = place
+        .run(&[
+            "optimize",
+            "tight.toml",
+            "--for",
+            FLAT,
+            "--vary",
+            "coil.length_mm=60:90",
+        ])
+        .ends(3);
+    assert!(
+        run.err.contains("resistance_ohm <= 0.0005") && run.err.contains("nearest, layers ="),
+        "{}",
+        run.err
+    );
+    // Out of the workspace's reach, above it.
+    let high = place
+        .text(FLAT)
+        .replace("surface = \"", "surface = \"shapes/");
+    let high = high.replace("0.0, 0.0, 50.0", "0.0, 0.0, 400.0");
+    place.write("high.toml", &high);
+    let run = place
+        .run(&[
+            "optimize",
+            SEED,
+            "--for",
+            "high.toml",
+            "--vary",
+            "array.pitch_mm=40:60",
+        ])
+        .ends(4);
+    assert!(
+        run.err.contains("wholly outside the design's workspace"),
+        "{}",
+        run.err
+    );
+}
+
+/// A sweep whose points are searches: the same bytes in shards, and a column for every variable.
+#[test]
+fn a_sweep_searches_an_array_for_every_limit() {
+    let place = Place::new();
+    let text = place.text(SEED);
+    let search = "[search]\ncoil.inner_diameter_mm = [6.0, 30.0]\narray.pitch_mm = [38.0, 60.0]\n";
+    place.write("air.toml", &format!("{text}\n{search}"));
+    let shape = place
+        .text(FLAT)
+        .replace("surface = \"", "surface = \"shapes/");
+    place.write("plane.toml", &shape);
+    let plan = [
+        "sweep",
+        "plan",
+        "air.toml",
+        "--for",
+        "plane.toml",
+        "--evaluations",
+        "24",
+    ];
+    let set = [
+        "--set",
+        "limits.resistance_max_ohm=5,7",
+        "--out",
+        "plan.json",
+    ];
+    place.run(&[&plan[..], &set[..]].concat()).ends(0);
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "whole"])
+        .ends(0);
+    for shard in ["2/2", "1/2"] {
+        let run = [
+            "sweep",
+            "run",
+            "plan.json",
+            "--out",
+            "parts",
+            "--shard",
+            shard,
+        ];
+        place.run(&[&run[..], &["--threads", "1"]].concat()).ends(0);
+    }
+    let merged = |folder: &str| {
+        let table = format!("{folder}.d/sweep.csv");
+        let merge = ["sweep", "merge", "plan.json", folder, "--out", &table];
+        let run = place.run(&merge).ends(0);
+        assert!(run.out.contains("times the given array"), "{}", run.out);
+        String::from_utf8(place.read(&table)).expect("text")
+    };
+    let table = merged("whole");
+    assert_eq!(table, merged("parts"));
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().expect("a head");
+    let column = |name: &str| head.iter().position(|one| *one == name).expect(name);
+    let rows: Vec<_> = lines.collect();
+    let value = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().expect(name);
+    assert!(value(0, "gain") < value(1, "gain"));
+    for row in 0..2 {
+        let limit = value(row, "limits.resistance_max_ohm");
+        assert!(value(row, "resistance_ohm") <= limit && value(row, "coils") == 9.0);
+        assert!((38.0..=60.0).contains(&value(row, "best:array.pitch_mm")));
+        assert_eq!(value(row, "best:layers"), value(row, "best:layers").round());
+    }
+    place.write("plane.toml", &format!("{shape}\n# edited\n"));
+    let run = ["sweep", "run", "plan.json", "--out", "again"];
+    let refused = place.run(&run).ends(3);
+    assert!(
+        refused.err.contains("has changed since the plan"),
+        "{}",
+        refused.err
+    );
 }

@@ -6,8 +6,8 @@ mod store;
 mod summary;
 mod table;
 
-pub use plan::{Axis, Mode, POINTS_MAX, PlanFile, Value};
-pub use point::{OptimumRow, PointFile, Row, Status};
+pub use plan::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
+pub use point::{ArrayRow, OptimumRow, PointFile, Row, Status};
 pub use store::{PointStore, StoredPoint};
 pub use summary::MergeSummary;
-pub use table::{OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};
+pub use table::{ARRAY_COLUMNS, OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};

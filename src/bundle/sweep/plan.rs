@@ -23,6 +23,19 @@ pub enum Mode {
     /// The best of those that have whole layers and turns.
     #[serde(rename = "optimize-wound")]
     OptimizeWound,
+    /// The array that is felt best over the plan's shapes.
+    #[serde(rename = "optimize-for")]
+    OptimizeFor,
+}
+
+/// What an array is searched for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArrayTask {
+    /// Shape files; they and their surfaces are the last inputs of the plan.
+    pub shapes: Vec<String>,
+    /// Most arrays that the search of a point computes.
+    pub evaluations: usize,
 }
 
 /// A value that a design's key is set to.
@@ -71,6 +84,9 @@ pub struct PlanFile {
     pub points: u64,
     /// Keys that vary.
     pub axes: Vec<Axis>,
+    /// The shapes of `optimize-for`; absent in other modes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<ArrayTask>,
     /// The design file's text.
     pub design_text: String,
     /// Digest of this plan with this value empty, as compact JSON: an edited plan is recognised.
@@ -99,11 +115,21 @@ impl PlanFile {
             tolerance,
             points: combinations(&axes).unwrap_or(0),
             axes,
+            array: None,
             design_text,
             plan_sha256: String::new(),
         };
         plan.plan_sha256 = plan.digest();
         plan
+    }
+
+    /// The plan with the shapes of [`Mode::OptimizeFor`], whose files join the inputs; sealed again.
+    #[must_use]
+    pub fn for_shapes(mut self, task: ArrayTask, inputs: Vec<Input>) -> Self {
+        self.inputs.extend(inputs);
+        self.array = Some(task);
+        self.plan_sha256 = self.digest();
+        self
     }
 
     /// Reads a plan.
@@ -128,6 +154,12 @@ impl PlanFile {
                 "{name}: points = {} is not the number of combinations of the axes' values; make \
                  a new one with `fluxform sweep plan`",
                 plan.points
+            ));
+        }
+        if (plan.mode == Mode::OptimizeFor) != plan.array.is_some() {
+            return Err(format!(
+                "{name}: mode and array do not go together: shapes belong to optimize-for; make a new one \
+                 with `fluxform sweep plan`"
             ));
         }
         if plan.points > POINTS_MAX {

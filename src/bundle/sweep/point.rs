@@ -1,5 +1,7 @@
 //! A point's file: its row, whose it is, and a checksum.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
@@ -30,7 +32,7 @@ pub enum Status {
     Done,
     /// Computed, but not to the tolerance.
     AccuracyNotReached,
-    /// No coil meets the design's limits; the message says which is nearest to blame.
+    /// No coil or array that was found meets the design's limits; the message says which is to blame.
     Infeasible,
     /// The design lacks a limit without which there is no best coil.
     Unbounded,
@@ -49,7 +51,7 @@ impl Status {
 }
 
 /// Row of one design: one coil alone at its rated current, SI.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Row {
     /// Number of turns.
     pub turns: f64,
@@ -78,6 +80,24 @@ pub struct Row {
     /// The best coil's dimensions; absent where the coil is the design's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub optimum: Option<OptimumRow>,
+    /// The best array; absent where none was searched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<ArrayRow>,
+}
+
+/// The array that is felt best within a design's limits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArrayRow {
+    /// Geometric mean of its force constants over those of the design as given.
+    pub gain: f64,
+    /// Force constant of every shape.
+    pub lambda_n_per_m: Vec<f64>,
+    /// Coils.
+    pub coils: u64,
+    /// Arrays that were computed.
+    pub evaluations: u64,
+    /// Its variables by key, in the key's unit.
+    pub values: BTreeMap<String, f64>,
 }
 
 /// Result for a design.
@@ -231,6 +251,7 @@ mod tests {
             core_peak_field_t: None,
             limits_met: true,
             optimum: None,
+            array: None,
         };
         PointFile::new("abc", 7, Ok((row, Status::Done)))
     }

@@ -44,6 +44,12 @@ macro_rules! of_optimum {
     };
 }
 
+macro_rules! of_array {
+    ($name:literal, $kind:ident, $best:ident => $value:expr) => {
+        of_row!($name, $kind, row => row.array.as_ref().and_then(|$best| $value))
+    };
+}
+
 /// Columns after `index` and the set keys.
 pub static ROW_COLUMNS: [Column; 14] = [
     of_row!("turns", Number, row => Some(row.turns)),
@@ -79,11 +85,20 @@ pub static OPTIMUM_COLUMNS: [Column; 8] = [
     of_optimum!("upper_bound_n", Number, best => best.upper_bound_n),
 ];
 
+/// Columns after those of a sweep that searches arrays; `best:KEY` of every variable follow.
+pub static ARRAY_COLUMNS: [Column; 4] = [
+    of_array!("gain", Number, best => Some(best.gain)),
+    of_array!("smallest_lambda_n_per_m", Number, best => best.lambda_n_per_m.iter().copied().reduce(f64::min)),
+    of_array!("coils", Count, best => Some(best.coils)),
+    of_array!("evaluations", Count, best => Some(best.evaluations)),
+];
+
 /// The columns of a sweep's results.
 pub fn columns(mode: Mode) -> impl Iterator<Item = &'static Column> {
     let of_optimum: &[Column] = match mode {
         Mode::Evaluate => &[],
         Mode::Optimize | Mode::OptimizeWound => &OPTIMUM_COLUMNS,
+        Mode::OptimizeFor => &ARRAY_COLUMNS,
     };
     ROW_COLUMNS.iter().chain(of_optimum)
 }
@@ -92,12 +107,15 @@ pub fn columns(mode: Mode) -> impl Iterator<Item = &'static Column> {
 pub struct TableWriter<'a> {
     out: &'a mut dyn Write,
     mode: Mode,
+    /// Variables of arrays, one column each.
+    variables: &'a [String],
     line: Vec<u8>,
 }
 
 impl<'a> TableWriter<'a> {
-    /// Writes the header, with [`OPTIMUM_COLUMNS`] for a `mode` that optimises; `extra` are columns
-    /// after all others, given to every row.
+    /// Writes the header, with [`OPTIMUM_COLUMNS`] for a `mode` that optimises and [`ARRAY_COLUMNS`] and
+    /// the `variables` for one that searches arrays; `extra` are columns after all others, given to
+    /// every row.
     ///
     /// # Errors
     /// The writer's.
@@ -105,19 +123,26 @@ impl<'a> TableWriter<'a> {
         out: &'a mut dyn Write,
         mode: Mode,
         keys: impl IntoIterator<Item = &'k str>,
+        variables: &'a [String],
         extra: &[&'k str],
     ) -> io::Result<Self> {
         let mut table = Self {
             out,
             mode,
+            variables,
             line: Vec::new(),
         };
         table.text("index");
         for key in keys
             .into_iter()
             .chain(columns(mode).map(|column| column.name))
-            .chain(extra.iter().copied())
         {
+            table.text(key);
+        }
+        for key in variables {
+            table.text(&format!("best:{key}"));
+        }
+        for key in extra {
             table.text(key);
         }
         table.end()?;
@@ -140,6 +165,11 @@ impl<'a> TableWriter<'a> {
         }
         for column in columns(self.mode) {
             self.cell(&(column.cell)(point));
+        }
+        let array = point.row.as_ref().and_then(|row| row.array.as_ref());
+        for key in self.variables {
+            let value = array.and_then(|array| array.values.get(key));
+            self.cell(&Cell::Number(value.copied()));
         }
         for flag in extra {
             self.text(&flag.to_string());
@@ -218,6 +248,7 @@ mod tests {
             &mut text,
             Mode::Evaluate,
             ["wire.diameter_mm", "a"],
+            &[],
             &["front"],
         )
         .unwrap();

@@ -45,6 +45,14 @@ impl Placed<'_> {
         report.warnings.extend(report.misplaced.clone());
     }
 
+    /// Why a runtime could render nearly nothing of the object; `None` where it could.
+    pub(crate) fn refused(&self) -> Option<String> {
+        match self.outside() {
+            Outside::Most(message) => Some(message),
+            Outside::None | Outside::Some(_) => None,
+        }
+    }
+
     /// The points outside the design's workspace, where a runtime gives no force.
     fn outside(&self) -> Outside {
         let axes = self.axes();

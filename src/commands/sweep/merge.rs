@@ -1,5 +1,6 @@
 //! `sweep merge`: the points of a plan as one table, and what is best among them.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
-    MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
+    MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
 };
 use crate::numerics::front::front;
 use crate::plot::landscape::Landscape;
@@ -95,6 +96,9 @@ pub struct StrongestDesign {
     pub index: u64,
     /// The swept keys and their values.
     pub values: Vec<(String, String)>,
+    /// Gain of the best array over the given one; absent where no array is searched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
     /// |force|, N.
     pub force_n: f64,
     /// Resistance, ohm, mass, kg, and settling time, s.
@@ -107,8 +111,8 @@ impl StrongestDesign {
     fn of(plan: &PlanFile, briefs: &[Brief]) -> Option<Self> {
         // Of equal ones the first.
         let stronger = |a: &&Brief, b: &&Brief| {
-            let force = a.force_n.total_cmp(&b.force_n);
-            a.met.cmp(&b.met).then(force).then(b.index.cmp(&a.index))
+            let gain = a.gain.total_cmp(&b.gain);
+            a.met.cmp(&b.met).then(gain).then(b.index.cmp(&a.index))
         };
         let best = briefs.iter().max_by(stronger)?;
         let keys = plan.axes.iter().map(|axis| axis.key.clone());
@@ -116,6 +120,7 @@ impl StrongestDesign {
         Some(Self {
             index: best.index,
             values: keys.zip(values).collect(),
+            gain: (plan.mode == Mode::OptimizeFor).then_some(best.gain),
             force_n: best.force_n,
             costs: best.costs,
             limits_met: best.met,
@@ -123,9 +128,11 @@ impl StrongestDesign {
     }
 }
 
-/// The few numbers of a point that are held: index, force, costs, whether limits are met.
+/// The few numbers of a point that are held: index, what is made large, force, costs, whether limits
+/// are met.
 struct Brief {
     index: u64,
+    gain: f64,
     force_n: f64,
     costs: [f64; 3],
     met: bool,
@@ -242,10 +249,11 @@ fn write_front(
         .iter()
         .map(|(index, _)| found(plan, request, *index))
         .collect::<Result<Vec<_>, _>>()?;
+    let variables = variables(plan, request)?;
     let written = set.write(name, |out| {
         let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-        let mut table =
-            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
+        let fronts = COSTS.map(|(_, _, column)| column);
+        let mut table = TableWriter::begin(out, plan.mode, keys, &variables, &fronts)?;
         for ((index, flags), point) in best.iter().zip(&points) {
             // A file that existed a moment ago may be gone.
             let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
@@ -292,7 +300,8 @@ fn gather(
 ) -> Result<Gathered, Stop> {
     let mut gathered = Gathered::default();
     let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-    let mut table = TableWriter::begin(out, plan.mode, keys, &[])?;
+    let variables = variables(plan, request).map_err(Stop::Job)?;
+    let mut table = TableWriter::begin(out, plan.mode, keys, &variables, &[])?;
     progress.begin("merge", plan.points);
     for start in (0..plan.points).step_by(PORTION as usize) {
         progress.check().map_err(|error| Stop::Job(error.into()))?;
@@ -328,6 +337,22 @@ fn gather(
     Ok(gathered)
 }
 
+/// The variables of all arrays that were found, in order; swept keys decide which there are.
+fn variables(plan: &PlanFile, request: &MergeRequest) -> Result<Vec<String>, RunError> {
+    let mut all = BTreeSet::new();
+    if plan.mode == Mode::OptimizeFor {
+        for index in 0..plan.points {
+            let row = found(plan, request, index)?.and_then(|point| point.row);
+            all.extend(
+                row.and_then(|row| row.array)
+                    .into_iter()
+                    .flat_map(|array| array.values.into_keys()),
+            );
+        }
+    }
+    Ok(all.into_iter().collect())
+}
+
 impl Gathered {
     fn add(&mut self, point: &PointFile) {
         use crate::bundle::sweep::Status;
@@ -340,6 +365,10 @@ impl Gathered {
         if let Some(row) = &point.row {
             self.briefs.push(Brief {
                 index: point.index,
+                gain: row
+                    .array
+                    .as_ref()
+                    .map_or(row.force_n.abs(), |array| array.gain),
                 force_n: row.force_n.abs(),
                 costs: [row.resistance_ohm, row.mass_kg, row.settling_s],
                 met: row.limits_met,
@@ -403,7 +432,7 @@ fn fronts(briefs: &[Brief]) -> ([Vec<usize>; 3], bool) {
     let fronts = std::array::from_fn(|cost| {
         let points: Vec<[f64; 2]> = competing
             .iter()
-            .map(|at| [briefs[*at].costs[cost], briefs[*at].force_n])
+            .map(|at| [briefs[*at].costs[cost], briefs[*at].gain])
             .collect();
         front(&points).into_iter().map(|at| competing[at]).collect()
     });
@@ -436,11 +465,15 @@ fn plot(
             front: fronts[cost].clone(),
         }
     };
+    let (gain, gain_unit) = match plan.mode {
+        Mode::OptimizeFor => ("force constants, relative", ""),
+        Mode::Evaluate | Mode::Optimize | Mode::OptimizeWound => ("force on the magnet", "N"),
+    };
     ParetoPlot {
         title: format!("{}: {} designs", plan.design, briefs.len()),
-        gain: "force on the magnet",
-        gain_unit: "N",
-        gains: briefs.iter().map(|brief| brief.force_n).collect(),
+        gain,
+        gain_unit,
+        gains: briefs.iter().map(|brief| brief.gain).collect(),
         limits_met: briefs.iter().map(|brief| brief.met).collect(),
         front: if among_met {
             "best of those that meet them"

@@ -18,7 +18,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::quantity::{bytes, count, force, mass, si};
+use crate::cli::quantity::{bytes, count, force, mass, number, si};
 use crate::cli::start::{begin, folder};
 use crate::cli::values::{self, FileArgument};
 
@@ -228,16 +228,23 @@ fn strongest(best: &StrongestDesign) -> String {
         .iter()
         .map(|(key, value)| format!("{key} = {value}"))
         .collect();
+    let (achieved, strongest) = match best.gain {
+        Some(gain) => (
+            format!("{} times the given array", number(gain)),
+            "felt best",
+        ),
+        None => (force(best.force_n), "the strongest"),
+    };
     let among = if best.limits_met {
-        "the strongest within its limits"
+        " within its limits"
     } else {
-        "the strongest; none meets its limits"
+        "; none meets its limits"
     };
     format!(
-        "design {}: {}\n{}, {}, {}, settled after {}: {among}",
+        "design {}: {}\n{}, {}, {}, settled after {}: {strongest}{among}",
         best.index,
         values.join(", "),
-        force(best.force_n),
+        achieved,
         si(resistance_ohm, "ohm"),
         mass(mass_kg),
         si(settling_s, "s")

@@ -7,9 +7,12 @@ use rayon::prelude::*;
 use super::point::toml_value;
 use crate::RunError;
 use crate::bundle::artefact::Input;
-use crate::bundle::sweep::{Axis, Mode, POINTS_MAX, PlanFile, Value};
+use crate::bundle::sweep::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
+use crate::commands::discretize::with_surface;
 use crate::design::template::Template;
-use crate::design::{Design, Severity, Steel, source};
+use crate::design::{Design, InvalidDocument, Severity, Steel, source};
+use crate::scene::sources::ShapeSource;
+use crate::shape::document::ShapeDocument;
 
 /// Values at fault that are reported one by one.
 const TOLD: usize = 20;
@@ -27,6 +30,8 @@ pub struct PlanRequest {
     pub seed: u64,
     /// Allowed error.
     pub tolerance: Option<f64>,
+    /// The shapes that arrays are searched for.
+    pub array: Option<ArrayTask>,
 }
 
 impl PlanRequest {
@@ -77,7 +82,7 @@ pub fn plan(
     for curve in curves(design, &path, &request.axes) {
         inputs.push(curve_input(&curve)?);
     }
-    Ok(PlanFile::new(
+    let plan = PlanFile::new(
         design.name.clone(),
         inputs,
         request.mode,
@@ -85,7 +90,35 @@ pub fn plan(
         request.tolerance,
         request.axes.clone(),
         text,
-    ))
+    );
+    Ok(match &request.array {
+        Some(task) => {
+            let inputs = shape_inputs(&shapes(task)?);
+            plan.for_shapes(task.clone(), inputs)
+        }
+        None => plan,
+    })
+}
+
+/// The shapes of an array's search, as their files are now.
+pub(super) fn shapes(task: &ArrayTask) -> Result<Vec<ShapeSource>, RunError> {
+    let refused = |wrong: InvalidDocument| RunError::Input(wrong.to_string());
+    let read = |name: &String| {
+        let path = Path::new(name);
+        let text = source::text_of(path).map_err(refused)?;
+        let (document, _) = ShapeDocument::from_toml(&text, path).map_err(refused)?;
+        let input = Some(Input::of_bytes(name, text.as_bytes()));
+        Ok(ShapeSource { document, input })
+    };
+    task.shapes.iter().map(read).collect()
+}
+
+/// The files of shapes and their surfaces among the inputs.
+pub(super) fn shape_inputs(shapes: &[ShapeSource]) -> Vec<Input> {
+    let of = |shape: &ShapeSource| {
+        with_surface(&shape.document, shape.input.clone().into_iter().collect())
+    };
+    shapes.iter().flat_map(of).collect()
 }
 
 /// A B-H table among the inputs.
@@ -192,6 +225,7 @@ mod tests {
             mode: Mode::Evaluate,
             seed: 0,
             tolerance: None,
+            array: None,
         };
         request.check()?;
         let (design, _) = Design::from_toml(DESIGN, Path::new("a.toml"), Need::SWEEP).unwrap();

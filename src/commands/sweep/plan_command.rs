@@ -1,5 +1,7 @@
 //! `sweep plan`: which designs a sweep computes.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use serde::Serialize;
 
@@ -8,7 +10,7 @@ use super::plan::{PlanRequest, plan};
 use crate::RunError;
 use crate::bundle::atomic::Overwrite;
 use crate::bundle::json::to_json;
-use crate::bundle::sweep::{Axis, Mode, PlanFile};
+use crate::bundle::sweep::{ArrayTask, Axis, Mode, PlanFile};
 use crate::bundle::write::write_json;
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
@@ -19,6 +21,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
+use crate::numerics::mixed_search::Settings;
 
 /// Write down which designs a sweep computes
 ///
@@ -36,6 +39,9 @@ use crate::design::Need;
      "three lengths, each under three limits"),
     ("fluxform sweep plan designs/seed_air.toml --optimize \\\n    --set limits.resistance_max_ohm=3:9:0.5 --out best.json",
      "the best coil of each resistance"),
+    ("fluxform sweep plan designs/seed_search.toml --for shapes/flat.toml shapes/wedge.toml \\\n    \
+      --set array.rows=2,3,4 --set limits.settling_max_ms=60:120:20 --out arrays.json",
+     "the best array of every number of rows and settling time"),
 ]))]
 pub struct Plan {
     /// Design file (TOML), `-` for standard input
@@ -54,6 +60,13 @@ pub struct Plan {
     /// With --optimize: whole layers and whole turns a layer
     #[arg(long, requires = "optimize")]
     wound: bool,
+    /// Search the array that is felt best over these shapes, as `optimize --for` does
+    #[arg(long = "for", value_name = "SHAPE", num_args = 1.., conflicts_with = "optimize")]
+    shapes: Vec<PathBuf>,
+    /// With --for: most arrays that are computed for each design
+    #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations as u32,
+          value_parser = clap::value_parser!(u32).range(1..))]
+    evaluations: u32,
     /// Where random numbers begin, together with a point's index; evaluating draws none
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -86,13 +99,23 @@ impl Plan {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let array = (!self.shapes.is_empty()).then(|| ArrayTask {
+            shapes: self
+                .shapes
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect(),
+            evaluations: self.evaluations as usize,
+        });
         let request = PlanRequest {
             axes: self.axes.clone(),
             mode: match (self.optimize, self.wound) {
+                _ if array.is_some() => Mode::OptimizeFor,
                 (false, _) => Mode::Evaluate,
                 (true, false) => Mode::Optimize,
                 (true, true) => Mode::OptimizeWound,
             },
+            array,
             seed: self.seed,
             tolerance: self.tolerance.tolerance,
         };

@@ -3,27 +3,36 @@
 use std::path::Path;
 
 use crate::RunError;
-use crate::bundle::sweep::{Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
+use crate::bundle::sweep::{ArrayRow, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
 use crate::coil::optimum::Ending;
+use crate::commands::optimize::array::physics::{ArrayPhysics, Constant};
+use crate::commands::optimize::array::{
+    ArrayEnding, ArrayRequest, optimize_array, settling_in_array,
+};
 use crate::commands::optimize::{Document, Optimization, OptimizeRequest, optimize};
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
-use crate::progress::Silent;
+use crate::numerics::mixed_search::Settings;
+use crate::progress::{Interrupted, Silent, poll};
 use crate::scene::Scene;
 use crate::scene::iron::without_iron;
 use crate::scene::rated::{CircuitSummary, Rated};
+use crate::scene::sources::ShapeSource;
+use crate::units::FORCE_JND;
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
     plan: &'a PlanFile,
     path: &'a Path,
     template: Template,
+    /// Those of a plan that searches arrays.
+    shapes: Vec<ShapeSource>,
 }
 
 impl<'a> Sweep<'a> {
     /// # Errors
     /// Invalid TOML.
-    pub(super) fn new(plan: &'a PlanFile) -> Result<Self, RunError> {
+    pub(super) fn new(plan: &'a PlanFile, shapes: Vec<ShapeSource>) -> Result<Self, RunError> {
         let path = plan.inputs.first().map_or("", |input| input.path.as_str());
         let path = Path::new(path);
         let template = Template::new(&plan.design_text, path)
@@ -32,6 +41,7 @@ impl<'a> Sweep<'a> {
             plan,
             path,
             template,
+            shapes,
         })
     }
 
@@ -39,7 +49,7 @@ impl<'a> Sweep<'a> {
     pub(super) fn point(&self, index: u64) -> PointFile {
         let sha256 = &self.plan.plan_sha256;
         let point = match self.outcome(index) {
-            Ok(Computed::Row(row, status)) => PointFile::new(sha256, index, Ok((row, status))),
+            Ok(Computed::Row(row, status)) => PointFile::new(sha256, index, Ok((*row, status))),
             Ok(Computed::NoCoil(status, why)) => PointFile::without_row(sha256, index, status, why),
             Err(message) => PointFile::new(sha256, index, Err(message)),
         };
@@ -62,6 +72,7 @@ impl<'a> Sweep<'a> {
         let need = match self.plan.mode {
             Mode::Evaluate => Need::EVALUATE,
             Mode::Optimize | Mode::OptimizeWound => Need::OPTIMIZE,
+            Mode::OptimizeFor => Need::CALIBRATE,
         };
         let (design, _) = Design::from_toml(&text, self.path, need).map_err(|e| refusal(&e))?;
         let computed = match self.plan.mode {
@@ -81,14 +92,87 @@ impl<'a> Sweep<'a> {
                 };
                 optimize(&document, Vec::new(), &request, &Silent).map(|result| optimum(&result))
             }
+            Mode::OptimizeFor => self.array(design, text, index),
         };
+        if let Err(RunError::Interrupted(_)) = computed {
+            // Leaves here: a point that was stopped is none.
+            poll();
+        }
         computed.map_err(|error| error.to_string())
+    }
+}
+
+impl Sweep<'_> {
+    /// The array that is felt best.
+    fn array(&self, design: Design, text: String, index: u64) -> Result<Computed, RunError> {
+        let tolerance = self.plan.tolerance;
+        let (design, text) = settling_in_array(design, text, self.path, tolerance)?;
+        let constant = Constant::default();
+        let physics = ArrayPhysics::new(&self.shapes, (constant, FORCE_JND), tolerance, &Silent)?;
+        let default = Settings::default();
+        let settings = Settings {
+            seed: self.plan.seed_at(index),
+            evaluations: self
+                .plan
+                .array
+                .as_ref()
+                .map_or(default.evaluations, |task| task.evaluations),
+            ..default
+        };
+        let request = ArrayRequest {
+            constant,
+            jnd_weight: FORCE_JND,
+            shares: Some(vec![1.0; self.shapes.len()]),
+            settings,
+            tolerance,
+        };
+        let document = Document {
+            design: &design,
+            text: &text,
+            path: self.path,
+        };
+        let found = optimize_array(
+            &document,
+            &self.shapes,
+            Vec::new(),
+            &request,
+            &physics,
+            &Silent,
+        )?;
+        match found.status {
+            ArrayEnding::Done => {}
+            ArrayEnding::Interrupted => return Err(RunError::Interrupted(Interrupted)),
+            ArrayEnding::Infeasible => {
+                let missed = found.limits.iter().filter(|(_, check)| !check.met);
+                let missed: Vec<&str> = missed.map(|(key, _)| *key).collect();
+                let why = format!("no array that was computed meets {}", missed.join(" and "));
+                return Ok(Computed::NoCoil(Status::Infeasible, why));
+            }
+        }
+        let (best, _) = Design::from_toml(&found.design_text, self.path, Need::EVALUATE)
+            .map_err(|wrong| RunError::Input(refusal(&wrong)))?;
+        let Computed::Row(mut row, status) = evaluated(&best, tolerance)? else {
+            return Err(RunError::Input("the best array has no coil".to_owned()));
+        };
+        row.limits_met = found.limits_met;
+        row.array = Some(ArrayRow {
+            gain: found.gain,
+            lambda_n_per_m: found
+                .shapes
+                .iter()
+                .map(|shape| shape.lambda_n_per_m)
+                .collect(),
+            coils: best.array.positions_m.len() as u64,
+            evaluations: found.evaluations as u64,
+            values: found.values,
+        });
+        Ok(Computed::Row(row, status))
     }
 }
 
 /// The result of one design.
 enum Computed {
-    Row(Row, Status),
+    Row(Box<Row>, Status),
     NoCoil(Status, String),
 }
 
@@ -119,7 +203,7 @@ fn optimum(result: &Optimization) -> Computed {
         }),
         ..row(coil.turns, &coil.circuit)
     };
-    Computed::Row(row, status(result.accuracy_reached))
+    Computed::Row(Box::new(row), status(result.accuracy_reached))
 }
 
 fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
@@ -133,7 +217,10 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunErr
         limits_met: rated.limits.values().all(|check| check.met),
         ..row(rated.coil.turns, &rated.coil.circuit)
     };
-    Ok(Computed::Row(row, status(rated.accuracy_missed.is_empty())))
+    Ok(Computed::Row(
+        Box::new(row),
+        status(rated.accuracy_missed.is_empty()),
+    ))
 }
 
 /// A row of the coil alone.

@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::plan::curve_input;
+use super::plan::{curve_input, shape_inputs, shapes};
 use super::point::Sweep;
 use crate::RunError;
 use crate::bundle::atomic::WriteError;
 use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
 use crate::progress::Progress;
+use crate::scene::sources::ShapeSource;
 
 /// Which points of a plan are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,8 +82,9 @@ pub fn run(
     force: bool,
     progress: &dyn Progress,
 ) -> Result<RunReport, RunError> {
-    check_inputs(plan)?;
-    let sweep = Sweep::new(plan)?;
+    let shapes = plan.array.as_ref().map_or(Ok(Vec::new()), shapes)?;
+    check_inputs(plan, &shapes)?;
+    let sweep = Sweep::new(plan, shapes)?;
     let store = PointStore::new(folder);
     let _folders = store.claim(plan, force, indices.clone())?;
     let points = indices.end - indices.start;
@@ -157,13 +159,18 @@ fn finished(
     }
 }
 
-/// The B-H tables are those the plan was made with.
-fn check_inputs(plan: &PlanFile) -> Result<(), RunError> {
+/// Tables, shapes and surfaces are those that the plan was made with.
+fn check_inputs(plan: &PlanFile, shapes: &[ShapeSource]) -> Result<(), RunError> {
+    let of_shapes = shape_inputs(shapes);
     for input in plan.inputs.iter().skip(1) {
-        let now = curve_input(&PathBuf::from(&input.path))?;
+        let known = of_shapes.iter().find(|now| now.path == input.path);
+        let now = match known {
+            Some(now) => now.clone(),
+            None => curve_input(&PathBuf::from(&input.path))?,
+        };
         if now.sha256 != input.sha256 {
             return Err(RunError::Input(format!(
-                "{}: the table has changed since the plan was made; make the plan again with \
+                "{}: the file has changed since the plan was made; make the plan again with \
                  `fluxform sweep plan`",
                 input.path
             )));

@@ -64,8 +64,9 @@ pub fn page(facts: &SweepFacts) -> String {
     });
     let text = format!(
         "{rows} of {points} designs, {met} of them within their limits; {} cannot be beaten in \
-         force and one of resistance, mass and settling time at once.{largest}",
-        facts.best.len()
+         {} and one of resistance, mass and settling time at once.{largest}",
+        facts.best.len(),
+        facts.plot.gain
     );
     lead.element("p class=\"lead\"", &text);
     let mut limits = Html::default();
@@ -154,7 +155,7 @@ fn answer(facts: &SweepFacts) -> Section {
     for head in ["force", "resistance", "mass", "settling"] {
         body.element("th scope=\"col\" class=\"n\"", head);
     }
-    body.raw("<th scope=\"col\">best in force and</th></tr></thead><tbody>");
+    body.raw("<th scope=\"col\">best in gain and</th></tr></thead><tbody>");
     for one in facts.best.iter().take(LISTED) {
         row(&mut body, one);
     }

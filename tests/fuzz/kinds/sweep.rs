@@ -197,6 +197,7 @@ fn shards() -> Vec<Input> {
         core_peak_field_t: None,
         limits_met: true,
         optimum: None,
+        array: None,
     };
     let good = PointFile::new(&plan.plan_sha256, 0, Ok((row, Status::Done)));
     let failed = PointFile::new(&plan.plan_sha256, 0, Err("a reason".into()));

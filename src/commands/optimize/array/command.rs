@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::physics::{ArrayPhysics, Constant, Journal};
-use super::{ArrayEnding, ArrayRequest, optimize_array, page, tables, text};
+use super::{ArrayEnding, ArrayRequest, optimize_array, page, settling_in_array, tables, text};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, check_distinct, write};
@@ -21,8 +21,6 @@ use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Progress};
-use crate::scene::Scene;
-use crate::scene::rated::Rated;
 
 /// An array for shapes instead of a coil.
 #[derive(Debug, Args)]
@@ -105,9 +103,8 @@ impl ArrayFlags {
             let read = Design::from_toml(text, path, Need::CALIBRATE);
             read.map_err(|fault| Failure::Documents(vec![fault]))
         };
-        let (mut design, _) = read(&text)?;
-        let text = settling_in_array(text, path, &design, shared.tolerance)?;
-        (design, _) = read(&text)?;
+        let (design, _) = read(&text)?;
+        let (design, text) = settling_in_array(design, text, path, shared.tolerance)?;
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
         let mark = mark(shared.design, &document.text);
@@ -221,7 +218,13 @@ impl ArrayFlags {
         for given in &self.vary {
             let (key, values) =
                 vary(given).map_err(|wrong| Failure::Usage(format!("--vary {given}: {wrong}")))?;
-            settings.push((format!("search.{key}"), values));
+            let key = format!("search.{key}");
+            if settings.iter().any(|(known, _)| *known == key) {
+                return Err(Failure::Usage(format!(
+                    "--vary {given}: the key is given twice; give all its values in one --vary"
+                )));
+            }
+            settings.push((key, values));
         }
         let settings = settings
             .iter()
@@ -293,33 +296,6 @@ impl ArrayFlags {
         let file = self.journal.as_ref();
         written_to(file, &format!("{mark}\n{text}\n"), overwrite, printer).map(|_| ())
     }
-}
-
-/// The text with the limit on a coil's settling as one on the array's too, unless it has its own or
-/// no array that is searched could meet it: the coil misses it and nothing changes the coil.
-fn settling_in_array(
-    text: String,
-    path: &std::path::Path,
-    design: &Design,
-    tolerance: Option<f64>,
-) -> Result<String, Failure> {
-    let key = "limits.array_settling_max_ms";
-    let template = Template::new(&text, path).map_err(|fault| Failure::Documents(vec![fault]))?;
-    let of_coil = template.get("limits.settling_max_ms").cloned();
-    let (Some(settling), None) = (of_coil, template.get(key)) else {
-        return Ok(text);
-    };
-    if !design.search.changes_coil() {
-        let alone = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
-        if alone
-            .limits
-            .get("settling_s")
-            .is_some_and(|check| !check.met)
-        {
-            return Ok(text);
-        }
-    }
-    template.with([(key, settling)]).map_err(Failure::Usage)
 }
 
 /// `KEY=FROM:TO` or `KEY=A,B,C` as a key of `[search]` and its value.

@@ -8,6 +8,7 @@ pub(crate) mod tables;
 mod text;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 pub use result::*;
 
@@ -19,12 +20,14 @@ use crate::coil::array_search::problem::{Level, Objective, Physical, Physics};
 use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
 use crate::coil::array_search::study::{Study, study};
 use crate::commands::evaluate::evaluate;
+use crate::design::search::SearchKey;
 use crate::design::template::Template;
-use crate::design::{Design, Need};
+use crate::design::{Design, InvalidDocument, Need};
 use crate::numerics::mixed_search::{MET, Settings};
 use crate::progress::{Interrupted, Progress};
 use crate::scene::Scene;
 use crate::scene::drawing::drawing;
+use crate::scene::rated::Rated;
 use crate::scene::sources::ShapeSource;
 
 /// The options of [`optimize_array`].
@@ -46,6 +49,39 @@ pub struct ArrayRequest {
 struct Before {
     search: Physical,
     full: Physical,
+}
+
+/// A design and its text with the limit on a coil's settling as one on the array's too, unless it has its
+/// own or no array that is searched could meet it: the coil misses it and nothing changes the coil.
+///
+/// # Errors
+/// A design that cannot be computed.
+pub(crate) fn settling_in_array(
+    design: Design,
+    text: String,
+    path: &Path,
+    tolerance: Option<f64>,
+) -> Result<(Design, String), RunError> {
+    let key = "limits.array_settling_max_ms";
+    let refused = |wrong: InvalidDocument| RunError::Input(wrong.to_string());
+    let template = Template::new(&text, path).map_err(refused)?;
+    let of_coil = template.get("limits.settling_max_ms").cloned();
+    let (Some(settling), None) = (of_coil, template.get(key)) else {
+        return Ok((design, text));
+    };
+    if !design.search.changes_coil() {
+        let alone = Rated::new(&Scene::with_tolerance(&design, tolerance)?)?;
+        let missed = alone
+            .limits
+            .get("settling_s")
+            .is_some_and(|check| !check.met);
+        if missed {
+            return Ok((design, text));
+        }
+    }
+    let text = template.with([(key, settling)]).map_err(RunError::Input)?;
+    let (design, _) = Design::from_toml(&text, path, Need::CALIBRATE).map_err(refused)?;
+    Ok((design, text))
 }
 
 /// The best array for `shapes` within the limits and the `[search]` of a design.
@@ -72,6 +108,11 @@ pub fn optimize_array(
     // What contradicts itself is known before anything is computed.
     let refused = |refused: Refused| RunError::Input(refused.to_string());
     problems(design, &search, &vec![1.0; shapes.len()], physics).map_err(refused)?;
+    if design.search.values(SearchKey::Height).is_none()
+        && let Some(why) = physics.misplaced(design, shapes)
+    {
+        return Err(RunError::Misplaced(why));
+    }
     progress.begin("given design", 2);
     let before = before(design, shapes, physics, progress)?;
     progress.end();

@@ -13,6 +13,7 @@ use crate::coil::array_search::problem::{Level, Physical, Physics};
 use crate::coil::mutual::slowest_inductance_h;
 use crate::commands::discretize;
 use crate::commands::lambda::WantedPoints;
+use crate::commands::lambda::placement::Placed;
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::feedback::{Span, reachable};
@@ -139,6 +140,21 @@ impl<'a> ArrayPhysics<'a> {
             progress,
             reported: AtomicUsize::new(0),
             known: Mutex::default(),
+        })
+    }
+
+    /// Why a runtime could render nearly nothing of one of `shapes` with `design`, at the height where it is.
+    pub fn misplaced(&self, design: &Design, shapes: &[ShapeSource]) -> Option<String> {
+        let mut placed = shapes.iter().zip(&self.fine);
+        placed.find_map(|(shape, points)| {
+            let document = &shape.document;
+            let refused = Placed {
+                design,
+                document,
+                points,
+            }
+            .refused()?;
+            Some(format!("shape {:?}: {refused}", document.name))
         })
     }
 
