@@ -70,7 +70,7 @@ fn tutorial(with: Option<Tool>) {
 
 fn the_better_display_is_found_as_shown() {
     let (place, files, commands, _, outputs) = run(BETTER, None);
-    assert_eq!((files, commands, outputs), (1, 5, 3));
+    assert_eq!((files, commands, outputs), (1, 6, 3));
     assert!(place.text("trade.csv").starts_with("quantity,value,gain,"));
 }
 
