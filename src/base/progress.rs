@@ -32,6 +32,8 @@ use std::sync::{Arc, LazyLock};
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 /// Computations inside [`interruptible`].
 static INTERRUPTIBLE: AtomicUsize = AtomicUsize::new(0);
+/// Computations inside [`to_its_end`].
+static TO_ITS_END: AtomicUsize = AtomicUsize::new(0);
 
 /// The process's request to stop, for who sets it from a signal's handler: true to stop.
 #[must_use]
@@ -67,10 +69,39 @@ pub fn poll() {
 #[cold]
 fn leave() {
     // A destructor that runs while the thread unwinds must not unwind again.
-    if INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && !std::thread::panicking() {
+    let leaves = INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && TO_ITS_END.load(Ordering::SeqCst) == 0;
+    if leaves && !std::thread::panicking() {
         // No panic: the hook is not called, so nothing is printed.
         resume_unwind(Box::new(Interrupted));
     }
+}
+
+/// Runs `work`, which is short, to its end although a stop is requested: what an interrupted computation
+/// still answers. [`poll`] does nothing meanwhile.
+///
+/// ```
+/// use fluxform_base::progress;
+///
+/// let answered = progress::interruptible(|| {
+///     progress::request_stop();
+///     progress::to_its_end(|| {
+///         progress::poll();
+///         7
+///     })
+/// });
+/// assert_eq!(answered, Ok(7));
+/// assert!(progress::interruptible(progress::poll).is_err());
+/// ```
+pub fn to_its_end<T>(work: impl FnOnce() -> T) -> T {
+    struct Guard;
+    impl Drop for Guard {
+        fn drop(&mut self) {
+            TO_ITS_END.fetch_sub(1, Ordering::SeqCst);
+        }
+    }
+    TO_ITS_END.fetch_add(1, Ordering::SeqCst);
+    let _guard = Guard;
+    work()
 }
 
 /// Runs `work` so that [`poll`] can end it.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use fluxform_base::progress::Interrupted;
+use fluxform_base::progress::{Interrupted, interruptible, to_its_end};
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Search, Settings};
 
@@ -228,7 +228,7 @@ pub fn run<'a>(
         for (index, search) in &mut going {
             let before = search.samples().len();
             search.allow(before + each);
-            interrupted = search.run(&[problems[*index].space.given(design)]).is_err();
+            interrupted = is_stopped(|| search.run(&[problems[*index].space.given(design)]));
             evaluations += search.samples().len() - before;
             if interrupted {
                 break;
@@ -251,19 +251,22 @@ pub fn run<'a>(
     let problem = &problems[index];
     let before = search.samples().len();
     search.allow(settings.evaluations.max(before + LEAST_EVALUATIONS));
-    interrupted = interrupted || search.run(&[problem.space.given(design)]).is_err();
-    let mut best = match (interrupted, accept(problem, &mut search)) {
-        (false, Ok(best)) => best,
-        (true, _) | (_, Err(Interrupted)) => {
-            interrupted = true;
-            searched(problem, &search)
-        }
+    interrupted = interrupted || is_stopped(|| search.run(&[problem.space.given(design)]));
+    let accepted = match interrupted {
+        false => interruptible(|| accept(problem, &mut search)).and_then(|accepted| accepted),
+        true => Err(Interrupted),
     };
-    if let Some(best) = &mut best {
-        best.x = problem.space.made(&best.x);
-    }
+    interrupted |= accepted.is_err();
     evaluations += search.samples().len() - before;
-    choices.push(SearchedChoice::of(problem, &search));
+    let (best, choice) = to_its_end(|| {
+        let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));
+        let best = best.map(|best| Candidate {
+            x: problem.space.made(&best.x),
+            ..best
+        });
+        (best, SearchedChoice::of(problem, &search))
+    });
+    choices.push(choice);
     choices.reverse();
     Ok(best.map(|best| Found {
         problem,
@@ -273,6 +276,11 @@ pub fn run<'a>(
         choices,
         interrupted,
     }))
+}
+
+/// Whether the user's stop ended `search`, wherever it was.
+fn is_stopped<T>(search: impl FnOnce() -> Result<T, Interrupted>) -> bool {
+    interruptible(search).and_then(|ended| ended).is_err()
 }
 
 /// The best design as the search knows it.

@@ -24,7 +24,7 @@ use crate::design::search::SearchKey;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need};
 use crate::numerics::mixed_search::{MET, Settings};
-use crate::progress::{Interrupted, Progress};
+use crate::progress::{Interrupted, Progress, interruptible, to_its_end};
 use crate::scene::Scene;
 use crate::scene::drawing::drawing;
 use crate::scene::rated::Rated;
@@ -123,19 +123,31 @@ pub fn optimize_array(
         return Err(RunError::Interrupted(Interrupted));
     };
     let around = match found.interrupted {
-        false => study(&mut found, design).ok(),
+        false => interruptible(|| study(&mut found, design))
+            .and_then(|studied| studied)
+            .ok(),
         true => None,
     };
     progress.end();
     // Nothing more is computed after the user's stop.
     found.interrupted |= progress.interrupted();
-    result(
-        document,
-        (shapes, inputs),
-        request,
-        physics,
-        (&before, &found, around),
-    )
+    let answer = |found: &Found<'_>, around: Option<Study>| {
+        let inputs = inputs.clone();
+        result(
+            document,
+            (shapes, inputs),
+            request,
+            physics,
+            (&before, found, around),
+        )
+    };
+    if !found.interrupted
+        && let Ok(answered) = interruptible(|| answer(&found, around.clone()))
+    {
+        return answered;
+    }
+    found.interrupted = true;
+    to_its_end(|| answer(&found, around))
 }
 
 /// The height that no core may reach: the workspace's lowest, the target's and the shapes' lowest
