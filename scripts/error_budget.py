@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """What `--error` claims against what is true, and what it costs.
 
-    python3 scripts/error_budget.py [PROGRAM] [DESIGN]
+    python3 scripts/error_budget.py [PROGRAM] [--design DESIGN] [--shapes SHAPE...] [--errors ERROR...]
 
-For the seed's four shapes and requested errors from 10 % to 0.1 % prints a table: the true error of
-lambda (against 641 x 641 points by area in a field ten times finer), the stated one, their ratio; the
-true error of the force, at random places of the surface that are neither points nor nodes (the currents
-by the bundle's map and heights against `probe` and the surface itself, relative to the requested force;
-places where the surface jumps left out, as the budget does), the stated one, their ratio; processor time
-of `calibrate`; the points chosen, and those of the uniform grid of equal points that has the same error
-of lambda. PROGRAM is the fluxform binary; without it the release build is made and used. Needs numpy.
+For each shape, the seed's four unless others are named, and each requested error, from 10 % to 0.1 %,
+prints a row: the true error of lambda (against 641 x 641 points by area in a field ten times finer), the
+stated one, their ratio; the true error of the force, at random places of the surface that are neither
+points nor nodes (the currents by the bundle's map and heights against `probe` and the surface itself,
+relative to the requested force; places where the surface jumps left out, as the budget does), the stated
+one, their ratio; processor time of `calibrate` and the points chosen; then the points and the processor
+time of the uniform grid of equal points, nodes of the map chosen for that error too, whose lambda is as
+near, and its force's true error. PROGRAM is the fluxform binary; without it the release build is made and
+used. Needs numpy.
 """
 
+import argparse
 import csv
 import io
 import json
@@ -33,12 +36,16 @@ SHAPES = ["flat", "half_sphere", "half_cylinder", "wedge"]
 ERRORS = [0.1, 0.03, 0.01, 0.003, 0.001]
 FINEST = 641
 UNIFORM = [9, 17, 31, 61, 121, 241, 481]
+HEADER = """\
+| shape | --error | lambda: true | stated | ratio | force: true | stated | ratio | CPU s | points | uniform grid | CPU s \
+| force: true |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
-def program():
+def program(named):
     """The binary named on the command line, or the release build."""
-    if len(sys.argv) > 1:
-        return os.path.abspath(sys.argv[1])
+    if named:
+        return os.path.abspath(named)
     subprocess.run(["cargo", "build", "--release", "--locked"], cwd=ROOT, check=True)
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     return str(target / "release" / "fluxform")
@@ -50,79 +57,124 @@ def ran(command, folder):
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: {done.stderr}")
+        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
     return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def with_grid(text, samples, folder, name):
-    """A shape file with so many points along each axis."""
-    text = re.sub(r", 61\]", f", {samples}]", text)
-    text = text.replace('surface = "', f'surface = "{ROOT}/shapes/')
-    path = folder / f"{name}_{samples}.toml"
-    path.write_text(text)
-    return str(path)
+class Scene:
+    """A design and a shape, with what is known of them by other routes."""
+
+    def __init__(self, binary, design, shape, folder, finest=FINEST):
+        self.binary, self.design, self.shape, self.folder = binary, str(design), pathlib.Path(shape), folder
+        cored = "[core]" in pathlib.Path(design).read_text()
+        self.finer = ["--tolerance", "1e-5" if cored else "1e-9"]
+        self.limit = self.lambda_of(self.with_grid(finest), "--weights", "area")
+        self.places = self.random_places()
+        self.forces = self.probed()
+
+    def lambda_of(self, shape, *options):
+        """Lambda in a field ten times finer."""
+        command = [self.binary, "lambda", self.design, shape, *self.finer, "--format", "json", *options]
+        return json.loads(ran(command, self.folder)[0])["lambda_n_per_m"]
+
+    def with_grid(self, samples):
+        """A shape file with so many points along each axis."""
+        text = re.sub(r"(\b[xy]_mm = \[[^\]]*, )\d+\]", rf"\g<1>{samples}]", self.shape.read_text())
+        text = text.replace('surface = "', f'surface = "{self.shape.parent.resolve()}/')
+        path = self.folder / f"{self.shape.stem}_{samples}.toml"
+        path.write_text(text)
+        return str(path)
+
+    def random_places(self):
+        """Places of the surface that are on no grid, m."""
+        command = [self.binary, "discretize", str(self.shape), "--poisson", "4.3mm", "--seed", "7", "--out", "-"]
+        rows = csv.DictReader(io.StringIO(ran(command, self.folder)[0]))
+        places = np.array([[float(r[k]) for k in ("x_m", "y_m", "height_m")] for r in rows])
+        return places[places[:, 2] > 0.05 * places[:, 2].max()]
+
+    def probed(self):
+        """The upward force of each coil at those places, N/A."""
+        (self.folder / "places.csv").write_text(
+            "x_m,y_m,z_m\n" + "".join(",".join(map(repr, p.tolist())) + "\n" for p in self.places))
+        command = [self.binary, "probe", self.design, "places.csv", "--magnet-force", "--components", "gz", *self.finer]
+        rows = csv.DictReader(io.StringIO(ran(command, self.folder)[0]))
+        return np.array([float(r["force_z_n_per_a"]) for r in rows]).reshape(len(self.places), -1)
+
+    def calibrated(self, shape, *options):
+        """A bundle's JSON result and its processor time."""
+        command = [self.binary, "calibrate", self.design, str(shape), *options, "--no-report", "--out", "bundles", "--force",
+                   "--no-cache", "--format", "json"]
+        printed, seconds = ran(command, self.folder)
+        return json.loads(printed)["bundles"][0], seconds
+
+    def force_error(self, bundle_json):
+        """The largest relative error of the rendered force at the random places, jumps left out."""
+        bundle = Bundle(self.folder / bundle_json["folder"])
+        height = self.places[:, 2]
+        interpolated = bundle.height(self.places)
+        spacing = bundle.map["height_x_m"][1] - bundle.map["height_x_m"][0]
+        with np.errstate(invalid="ignore"):
+            smooth = np.abs(interpolated - height) < 0.25 * spacing
+        smooth &= bundle.inside(self.places)
+        by_map = bundle.force_per_ampere(self.places) @ bundle.currents_a
+        off = np.abs(by_map - self.forces @ bundle.currents_a) / (bundle_json["lambda_n_per_m"] * height)
+        off += np.abs(interpolated - height) / height
+        return float(np.max(off[smooth])) if smooth.any() else 0.0
+
+    def at_error(self, error):
+        """What a run at a requested error claims, what is true, and what it costs."""
+        one, seconds = self.calibrated(self.shape, "--error", str(error), "--refine")
+        headline, found = one["headline"], one["lambda_n_per_m"]
+        return {
+            "lambda_true": abs(found / self.limit - 1),
+            "lambda_stated": headline["lambda_error_n_per_m"] / found,
+            "force_true": self.force_error(one),
+            "force_stated": headline["force_error"],
+            "met": headline["requested"]["met"],
+            "seconds": seconds,
+            "points": one["points"],
+        }
 
 
-def force_errors(bundle, places, direct, lambda_n_per_m):
-    """The largest relative error of the rendered force at `places`, jumps left out."""
-    height = places[:, 2]
-    interpolated = bundle.height(places)
-    spacing = bundle.map["height_x_m"][1] - bundle.map["height_x_m"][0]
-    with np.errstate(invalid="ignore"):
-        smooth = np.abs(interpolated - height) < 0.25 * spacing
-    smooth &= bundle.inside(places)
-    by_map = bundle.force_per_ampere(places) @ bundle.currents_a
-    off = np.abs(by_map - direct @ bundle.currents_a) / (lambda_n_per_m * height)
-    off += np.abs(interpolated - height) / height
-    return float(np.max(off[smooth])), int(np.sum(~smooth))
+def uniform_grids(scene):
+    """Points and true error of lambda of uniform grids of equal points, with their shapes."""
+    for samples in UNIFORM:
+        grid = scene.with_grid(samples)
+        command = [scene.binary, "lambda", scene.design, grid, *scene.finer, "--format", "json"]
+        one = json.loads(ran(command, scene.folder)[0])
+        yield one["points"], abs(one["lambda_n_per_m"] / scene.limit - 1), grid
 
 
 def main():
-    binary = program()
-    design = os.path.abspath(sys.argv[2]) if len(sys.argv) > 2 else str(ROOT / "designs/seed.toml")
-    fine = "1e-5" if "[core]" in pathlib.Path(design).read_text() else "1e-12"
-    print("| shape | --error | lambda: true | stated | ratio | force: true | stated | ratio | CPU s | points "
-          "| uniform grid |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        for shape in SHAPES:
-            text = (ROOT / f"shapes/{shape}.toml").read_text()
-            finest = with_grid(text, FINEST, folder, shape)
-            solve = [binary, "lambda", design, "--tolerance", fine, "--format", "json"]
-            limit = json.loads(ran([*solve, finest, "--weights", "area"], folder)[0])["lambda_n_per_m"]
-            uniform = {}
-            for samples in UNIFORM:
-                grid = with_grid(text, samples, folder, shape)
-                one = json.loads(ran([*solve, grid], folder)[0])
-                uniform[one["points"]] = abs(one["lambda_n_per_m"] / limit - 1)
-            table = ran([binary, "discretize", str(ROOT / f"shapes/{shape}.toml"), "--poisson", "4.3mm", "--seed",
-                         "7", "--out", "-"], folder)[0]
-            rows = list(csv.DictReader(io.StringIO(table)))
-            places = np.array([[float(r[k]) for k in ("x_m", "y_m", "height_m")] for r in rows])
-            places = places[places[:, 2] > 0.05 * places[:, 2].max()]
-            (folder / "places.csv").write_text(
-                "x_m,y_m,z_m\n" + "".join(",".join(map(repr, p.tolist())) + "\n" for p in places))
-            probed = ran([binary, "probe", design, "places.csv", "--magnet-force", "--components", "gz", "--tolerance",
-                          fine], folder)[0]
-            probed = [float(r["force_z_n_per_a"]) for r in csv.DictReader(io.StringIO(probed))]
-            direct = np.array(probed).reshape(len(places), -1)
-            for error in ERRORS:
-                out = folder / f"{shape}_{error}"
-                command = [binary, "calibrate", design, str(ROOT / f"shapes/{shape}.toml"), "--error", str(error),
-                           "--refine", "--no-report", "--out", str(out), "--format", "json"]
-                printed, seconds = ran(command, folder)
-                one = json.loads(printed)["bundles"][0]
-                headline, found = one["headline"], one["lambda_n_per_m"]
-                true = abs(found / limit - 1)
-                stated = headline["lambda_error_n_per_m"] / found
-                force, jumps = force_errors(Bundle(one["folder"]), places, direct, found)
-                reaching = [n for n, off in sorted(uniform.items()) if off <= max(true, 1e-6)]
-                print(f"| {shape.replace('_', '-')} | {100 * error:g} % | {100 * true:.3g} % | {100 * stated:.2g} % | "
-                      f"{stated / true:.1f} | {100 * force:.2g} % | {100 * headline['force_error']:.2g} %"
-                      f"{'' if headline['requested']['met'] else ' (missed)'} | {headline['force_error'] / force:.1f} | "
-                      f"{seconds:.2f} | {one['points']} | {reaching[0] if reaching else 'over ' + str(max(uniform))} |",
-                      flush=True)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", nargs="?")
+    parser.add_argument("--design", default=ROOT / "designs/seed.toml", type=pathlib.Path)
+    parser.add_argument("--shapes", nargs="+", type=pathlib.Path, default=[ROOT / f"shapes/{s}.toml" for s in SHAPES])
+    parser.add_argument("--errors", nargs="+", type=float, default=ERRORS)
+    asked = parser.parse_args()
+    binary = program(asked.program)
+    print(HEADER)
+    for shape in asked.shapes:
+        with tempfile.TemporaryDirectory() as name:
+            scene = Scene(binary, asked.design.resolve(), shape.resolve(), pathlib.Path(name))
+            uniform, costs = list(uniform_grids(scene)), {}
+            for error in asked.errors:
+                of = scene.at_error(error)
+                # The reference is not believed beyond this.
+                near = max(of["lambda_true"], 1e-6)
+                reaching = next((grid for grid in uniform if grid[1] <= near), None)
+                points, _, grid = reaching or uniform[-1]
+                # Nodes as the budget chooses them: the error of given points is said, and they are obeyed.
+                if points not in costs:
+                    one, seconds = scene.calibrated(grid, "--error", str(error))
+                    costs[points] = seconds, scene.force_error(one)
+                seconds, force = costs[points]
+                print(f"| {shape.stem.replace('_', '-')} | {100 * error:g} % | {100 * of['lambda_true']:.3g} % | "
+                      f"{100 * of['lambda_stated']:.2g} % | {of['lambda_stated'] / of['lambda_true']:.1f} | "
+                      f"{100 * of['force_true']:.2g} % | {100 * of['force_stated']:.2g} %"
+                      f"{'' if of['met'] else ' (missed)'} | {of['force_stated'] / of['force_true']:.1f} | "
+                      f"{of['seconds']:.2f} | {of['points']} | {'' if reaching else 'over '}{points} | {seconds:.2f} | "
+                      f"{100 * force:.2g} % |", flush=True)
 
 
 if __name__ == "__main__":

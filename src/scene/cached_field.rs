@@ -4,6 +4,7 @@
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
 //! not computed. What is read is what was computed, to the bit.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::Serialize;
@@ -27,7 +28,6 @@ use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::progress::Progress;
-use crate::shape::certificate::Certificate;
 use crate::shape::document::ShapeDocument;
 
 /// Name of the folder beside a design's bundles.
@@ -36,6 +36,9 @@ pub const STORE_FOLDER: &str = ".fluxform-cache";
 const MOST_NODES_HELD: usize = 8_000_000;
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
+
+/// Points and the forces at them, N/A.
+type TriedForces = (Vec<[f64; 3]>, Vec<f64>);
 
 /// Where a design's field is cached.
 #[derive(Debug)]
@@ -48,6 +51,8 @@ pub struct FieldStore {
     inspection: OnceLock<Inspection>,
     /// The pull that the design leaves out, over the region of the last shape.
     pull: Mutex<Option<(Region, Arc<Option<PassivePull>>)>>,
+    /// Points at which forces were computed while points were chosen, and the forces.
+    tried: Mutex<Vec<TriedForces>>,
     /// The last shape's map and the digest of what it was made from.
     last_map: Mutex<Option<([u8; 32], SceneMap)>>,
 }
@@ -91,6 +96,7 @@ impl FieldStore {
             field,
             inspection: OnceLock::new(),
             pull: Mutex::new(None),
+            tried: Mutex::default(),
             last_map: Mutex::new(None),
         }
     }
@@ -140,9 +146,47 @@ impl<'a> ShapeField<'a> {
         points_m: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
-        self.at_points(what, points_m, || {
-            scene.forces_n_per_a(solved, points_m, progress)
+        self.at_points(what, points_m, || match self.tried(points_m) {
+            Some(forces_n_per_a) => Ok(forces_n_per_a),
+            None => scene.forces_n_per_a(solved, points_m, progress),
         })
+    }
+
+    /// As [`Scene::forces_n_per_a`] while points are chosen: cached for the rest of this run, since some of those
+    /// that are tried are taken.
+    ///
+    /// # Errors
+    /// As [`Scene::forces_n_per_a`].
+    pub fn tried_forces_n_per_a(
+        self,
+        scene: &Scene,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        if let Some(forces_n_per_a) = self.tried(points_m) {
+            return Ok(forces_n_per_a);
+        }
+        let forces_n_per_a = scene.forces_n_per_a(solved, points_m, progress)?;
+        if let Some((FieldStore { tried, .. }, _)) = self.cached {
+            let mut tried = tried.lock().unwrap_or_else(PoisonError::into_inner);
+            let values = |tried: &[(Vec<[f64; 3]>, Vec<f64>)]| -> usize {
+                tried.iter().map(|(_, forces)| forces.len()).sum()
+            };
+            while !tried.is_empty() && values(&tried) + forces_n_per_a.len() > MOST_NODES_HELD {
+                tried.remove(0);
+            }
+            tried.push((points_m.to_vec(), forces_n_per_a.clone()));
+        }
+        Ok(forces_n_per_a)
+    }
+
+    /// The forces at these points, if they were tried.
+    fn tried(self, points_m: &[[f64; 3]]) -> Option<Vec<f64>> {
+        let (FieldStore { tried, .. }, _) = self.cached?;
+        let tried = tried.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = tried.iter().find(|(points, _)| points == points_m);
+        same.map(|(_, forces_n_per_a)| forces_n_per_a.clone())
     }
 
     /// As [`Scene::force_vectors_n_per_a`].
@@ -235,17 +279,43 @@ impl<'a> ShapeField<'a> {
             })
     }
 
-    /// The entry of what is found of the points of `document`, read from `inputs`.
+    /// The entry of what is found of the points of `document`, read from `inputs`; `what` is its name among those
+    /// of that shape.
     #[must_use]
-    pub fn certificate(self, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
-        let what = format!("{document:?}");
+    pub fn certificate(self, what: &str, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
+        self.of_surface(what, document, inputs, "")
+    }
+
+    /// The entry of the search for samples of `document`, read from `inputs`; `what` is its name among the searches
+    /// for that shape, and the debug text of `asked` all that it depends on beside the field.
+    #[must_use]
+    pub fn search(
+        self,
+        what: &str,
+        document: &ShapeDocument,
+        inputs: &[Input],
+        asked: &impl fmt::Debug,
+    ) -> Entry<'a> {
+        let field = self.cached.map(|(cached, _)| cached.field.sum());
+        let asked = format!("{:?}", (field, asked));
+        self.of_surface(&format!("{what}-search"), document, inputs, &asked)
+    }
+
+    fn of_surface(
+        self,
+        what: &str,
+        document: &ShapeDocument,
+        inputs: &[Input],
+        asked: &str,
+    ) -> Entry<'a> {
+        let text = format!("{document:?}{asked}");
         let origin = inputs.iter().fold(
-            Origin::of_build(BUILD).and(what.as_bytes()),
+            Origin::of_build(BUILD).and(text.as_bytes()),
             |origin, input| origin.and(input.sha256.as_bytes()),
         );
         Entry {
             store: self.cached.map(|(field, _)| &field.shapes),
-            name: format!("{}.points", document.name),
+            name: format!("{}.{what}", document.name),
             origin,
         }
     }
@@ -300,7 +370,7 @@ impl<'a> ShapeField<'a> {
     }
 }
 
-/// The cached certificate of a shape's points.
+/// A cached result of a shape's surface.
 #[derive(Debug)]
 pub struct Entry<'a> {
     store: Option<&'a Store>,
@@ -309,14 +379,28 @@ pub struct Entry<'a> {
 }
 
 impl Entry<'_> {
+    /// The result of an earlier run, or what `compute` gives, which is kept.
+    ///
+    /// # Errors
+    /// Those of `compute`.
+    pub fn remember<T: Serialize + DeserializeOwned, E>(
+        &self,
+        compute: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, E> {
+        match self.store {
+            Some(store) => store.remember(&self.name, &self.origin, compute),
+            None => compute(),
+        }
+    }
+
     /// The result of an earlier run.
     #[must_use]
-    pub fn known(&self) -> Option<Certificate> {
+    pub fn known<T: DeserializeOwned>(&self) -> Option<T> {
         self.store?.recall(&self.name, &self.origin)
     }
 
     /// Keeps what was found.
-    pub fn keep(&self, found: &Certificate) {
+    pub fn keep(&self, found: &impl Serialize) {
         if let Some(store) = self.store {
             store.keep(&self.name, &self.origin, found);
         }

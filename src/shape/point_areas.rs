@@ -25,8 +25,9 @@ const MOST_SAMPLES: usize = 65_536;
 const MOST_CELLS: usize = 4096;
 /// A cell of the grid is smooth whose middle departs by less than this share of its height from its corners' mean.
 const SMOOTH: f64 = 4e-3;
-/// The same of its parts.
-const SMOOTH_PART: f64 = 1e-3;
+/// The same of its parts, times their share of the cell: what a part adds to lambda's error is its departure times
+/// its area.
+const SMOOTH_PART: f64 = 5e-4;
 /// Bisections of a side: to 2e-5 of it.
 const BISECTIONS: u32 = 16;
 /// The same of a part of a cell: to 4e-3 of it.
@@ -223,7 +224,8 @@ impl Quarters<'_> {
             4 => {
                 let mean = 0.25 * heights_m.iter().flatten().sum::<f64>();
                 let middle = self.height_m(first.map(|at| at + side / 2));
-                middle.is_some_and(|height| ((height - mean) / mean).abs() <= SMOOTH_PART)
+                let parts = f64::from(1_u32 << (2 * (self.whole - depth)));
+                middle.is_some_and(|height| ((height - mean) / mean).abs() <= SMOOTH_PART * parts)
             }
             _ => false,
         };

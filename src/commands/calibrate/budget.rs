@@ -30,7 +30,7 @@ impl Calibration<'_> {
         let trial = Trial {
             scene: self.scene,
             solved: &self.solved.forces,
-            field: ShapeField::default(),
+            field: self.field,
             options: &self.options.lambda,
             for_runtime: true,
         };
@@ -49,22 +49,26 @@ impl Calibration<'_> {
         let Some((target, chosen)) = search.filter(|(_, chosen)| !chosen.fixed) else {
             return Ok(None);
         };
-        let divided = fewest_divisions(&chosen.document, progress, |tried| {
-            let heights = PointsOptions {
-                marks: false,
-                ..PointsOptions::default()
-            };
-            let report = opened.discretize(tried, &heights, None, progress)?;
-            let between = between_points(&report).0;
-            Ok(between.map(|part| part.error / target.between_points()))
+        let cached = (self.field).search("heights", &chosen.document, opened.inputs(), target);
+        let samples = cached.remember(|| {
+            fewest_divisions(&chosen.document, progress, |tried| {
+                let heights = PointsOptions {
+                    marks: false,
+                    ..PointsOptions::default()
+                };
+                let report = opened.discretize(tried, &heights, None, progress)?;
+                let between = between_points(&report).0;
+                Ok(between.map(|part| part.error / target.between_points()))
+            })
         })?;
+        let divided = chosen.document.with_samples(samples);
         if divided.grid == chosen.document.grid {
             return Ok(None);
         }
         // Creases decide in which direction a force along the normal points there.
         let marks = self.force().along_normal().is_some();
         opened
-            .discretize_cached((&divided, marks), self.field, progress)
+            .discretize_cached(("heights", &divided, marks), self.field, progress)
             .map(Some)
     }
 

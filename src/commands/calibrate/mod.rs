@@ -489,7 +489,7 @@ impl Calibration<'_> {
             .as_ref()
             .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
         Ok(ObjectPoints {
-            found: opened.discretize_cached((document, true), self.field, progress)?,
+            found: opened.discretize_cached(("points", document, true), self.field, progress)?,
             heights: self.heights(&opened, search.as_ref(), progress)?,
             search,
         })

@@ -28,7 +28,7 @@ const WIDE: f64 = 2.0;
 /// A little more than the law says, so that the next attempt holds.
 const SPARE: f64 = 1.08;
 
-/// `document` with the fewest samples whose excess, times which they exceed what is allowed, is 1 or less, and the
+/// The fewest samples of `document` whose excess, times which they exceed what is allowed, is 1 or less, and the
 /// power of the spacing with which it falls; its own where there is no excess to speak of (`None`).
 ///
 /// # Errors
@@ -38,7 +38,7 @@ pub(crate) fn fewest_points(
     target: ErrorTarget,
     progress: &dyn Progress,
     excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
-) -> Result<(ShapeDocument, f64), RunError> {
+) -> Result<([usize; 2], f64), RunError> {
     let most = if target.by_default {
         MOST_BY_DEFAULT
     } else {
@@ -53,10 +53,12 @@ pub(crate) fn fewest_points(
         }))
     };
     let search = Search::new((FIRST - 1) as f64, (most - 1) as f64);
-    search.run(sampled, progress, excess)
+    let (fewest, order) = search.run(sampled, progress, excess)?;
+    Ok((samples_of(&fewest).0, order))
 }
 
-/// `document` with every interval of its grid divided into the fewest equal ones whose excess is 1 or less.
+/// The samples of `document` where every interval of its grid is divided into the fewest equal ones whose excess is
+/// 1 or less.
 ///
 /// # Errors
 /// Those of `excess`; interruption.
@@ -64,7 +66,7 @@ pub(crate) fn fewest_divisions(
     document: &ShapeDocument,
     progress: &dyn Progress,
     excess: impl FnMut(&ShapeDocument) -> Result<Option<f64>, RunError>,
-) -> Result<ShapeDocument, RunError> {
+) -> Result<[usize; 2], RunError> {
     let (of_document, longest) = samples_of(document);
     let most = ((MOST - 1) / longest).max(1);
     let divided = |intervals: f64| {
@@ -72,7 +74,8 @@ pub(crate) fn fewest_divisions(
         document.with_samples(of_document.map(|samples| (samples - 1) * divisions + 1))
     };
     let search = Search::new(longest as f64, (most * longest) as f64);
-    Ok(search.run(divided, progress, excess)?.0)
+    let (fewest, _) = search.run(divided, progress, excess)?;
+    Ok(samples_of(&fewest).0)
 }
 
 /// The samples along x and y, and the intervals along the longer side.

@@ -1,9 +1,10 @@
 //! `discretize`: a surface to its constraint points.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
@@ -24,7 +25,7 @@ use crate::scene::cached_field::ShapeField;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::deviation::CERTIFY_SECONDS;
-use crate::shape::document::{ShapeDocument, SurfaceSource};
+use crate::shape::document::{GridRequest, ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
@@ -296,12 +297,12 @@ pub fn run_with(
         .error
         .filter(|target| target.refine || !document.grid_is_given);
     if let Some(target) = chosen {
-        let (fewest, _) = fewest_points(&document, target, progress, |tried| {
+        let (samples, _) = fewest_points(&document, target, progress, |tried| {
             let report = opened.discretize(tried, options, None, progress)?;
             let between = between_points(&report).0;
             Ok(between.map(|part| part.error / target.error))
         })?;
-        document = Cow::Owned(fewest);
+        document = Cow::Owned(document.with_samples(samples));
     }
     let mut report = opened.discretize(&document, options, None, progress)?;
     report.summary.made_with = made_with;
@@ -356,7 +357,15 @@ pub(crate) struct OpenedSurface {
     surface: Surface,
     warnings: Vec<String>,
     inputs: Vec<Input>,
+    /// The certificates of the last grids, which a search comes back to.
+    certified: Mutex<VecDeque<(CertificateAsked, Certificate)>>,
 }
+
+/// The grid that is compared with the surface, and how.
+type CertificateAsked = (GridRequest, Holes, Certify, u64);
+
+/// Certificates that are held: a search ends with one of the last grids that it tries.
+const CERTIFICATES_HELD: usize = 4;
 
 impl OpenedSurface {
     /// Reads the surface that `document` names; `inputs` holds the document's own entry, if it is a
@@ -379,21 +388,27 @@ impl OpenedSurface {
             surface,
             warnings,
             inputs,
+            certified: Mutex::default(),
         })
     }
 
+    /// The document's own entry, if it is a file, and the surface's.
+    pub(crate) fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
     /// As [`Self::discretize`], flagged by `marks`, with the certificate that an earlier run cached for these points and
-    /// this surface.
+    /// this surface as `what`.
     ///
     /// # Errors
     /// As [`run_with`].
     pub(crate) fn discretize_cached(
         &self,
-        (document, marks): (&ShapeDocument, bool),
+        (what, document, marks): (&str, &ShapeDocument, bool),
         field: ShapeField,
         progress: &dyn Progress,
     ) -> Result<PointsReport, RunError> {
-        let cached = field.certificate(document, &self.inputs);
+        let cached = field.certificate(what, document, &self.inputs);
         let known = cached.known();
         let new = known.is_none();
         let options = PointsOptions {
@@ -407,7 +422,18 @@ impl OpenedSurface {
         Ok(report)
     }
 
+    /// The certificate of one of the last grids.
+    fn certified_before(&self, asked: &CertificateAsked) -> Option<Certificate> {
+        let held = self
+            .certified
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let same = held.iter().find(|(of, _)| of == asked);
+        same.map(|(_, certificate)| certificate.clone())
+    }
+
     /// The points of `document`, whose grid alone may differ from that of the document that was opened.
+    /// Those of a grid that was certified alike among the last few take that certificate.
     ///
     /// # Errors
     /// As [`run_with`].
@@ -418,6 +444,13 @@ impl OpenedSurface {
         known: Option<Certificate>,
         progress: &dyn Progress,
     ) -> Result<PointsReport, RunError> {
+        let asked = (
+            document.grid,
+            options.holes,
+            options.certify,
+            options.certify_seconds,
+        );
+        let known = known.or_else(|| self.certified_before(&asked));
         let settings = Settings {
             holes: options.holes,
             certify: options.certify,
@@ -429,6 +462,15 @@ impl OpenedSurface {
         let surface = (&self.surface, self.warnings.clone());
         let discretized = discretize_surface(document, surface, &settings, progress)
             .map_err(|source| shape_error(document, source))?;
+        if let Some(certificate) = &discretized.certificate {
+            let mut held = self
+                .certified
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            held.retain(|(of, _)| *of != asked);
+            held.truncate(CERTIFICATES_HELD - 1);
+            held.push_front((asked, certificate.clone()));
+        }
         let mut report = report(document, self.inputs.clone(), discretized);
         if let Some(weights) = options.weights {
             report.weights = Some(weights);

@@ -113,6 +113,7 @@ pub fn run(
         surface,
         warnings,
         inputs,
+        ..
     } = OpenedSurface::new(document, inputs, progress)?;
     let failed = |source: ShapeError| shape_error(document, source);
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;

@@ -16,6 +16,7 @@ use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::passive;
 use crate::scene::steel::Solved;
+use crate::shape::certificate::Certify;
 use crate::shape::document::{AxisRequest, ShapeDocument};
 
 /// Other errors for which a run is estimated, against this one's.
@@ -69,10 +70,19 @@ impl Trial<'_> {
             grid_is_given: false,
             ..document.clone()
         };
-        let fewest = fewest_points(&free, target, progress, |document| {
-            self.excess(opened, document, target, progress)
+        let asked = (self.options, target, self.for_runtime);
+        let cached = (self.field).search(
+            "points",
+            &free,
+            opened.inputs(),
+            &(self.scene.design, asked),
+        );
+        let (samples, order) = cached.remember(|| {
+            fewest_points(&free, target, progress, |document| {
+                self.excess(opened, document, target, progress)
+            })
         })?;
-        (chosen.document, chosen.order) = fewest;
+        (chosen.document, chosen.order) = (free.with_samples(samples), order);
         Ok(chosen)
     }
 
@@ -86,7 +96,12 @@ impl Trial<'_> {
         progress: &dyn Progress,
     ) -> Result<Option<f64>, RunError> {
         let (scene, options) = (self.scene, self.options);
-        let report = opened.discretize(document, &PointsOptions::default(), None, progress)?;
+        // Heights between the points are held to a share of their own.
+        let heights_alone = PointsOptions {
+            certify: Certify::No,
+            ..PointsOptions::default()
+        };
+        let report = opened.discretize(document, &heights_alone, None, progress)?;
         let points = WantedPoints::of_object(
             &report,
             options.weights_of(&report),
@@ -94,7 +109,7 @@ impl Trial<'_> {
         );
         let positions = &points.positions_m;
         let forces_n_per_a =
-            (self.field).forces_n_per_a("trial", scene, self.solved, positions, progress)?;
+            (self.field).tried_forces_n_per_a(scene, self.solved, positions, progress)?;
         let pull = if scene.design.magnet.passive_force {
             passive::pull(scene, positions, false)?
         } else {
@@ -123,7 +138,8 @@ impl Trial<'_> {
         let at = ForcesAt {
             scene,
             solved: self.solved,
-            field: self.field,
+            // What is computed for a trial is of no use to later runs.
+            field: ShapeField::default(),
             progress,
         };
         let of_points = points
