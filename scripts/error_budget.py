@@ -9,8 +9,8 @@ stated one, their ratio; the true error of the force, at random places of the su
 points nor nodes (the currents by the bundle's map and heights against `probe` and the surface itself,
 relative to the requested force; places where the surface jumps left out, as the budget does), the stated
 one, their ratio; processor time of `calibrate` and the points chosen; then the points and the processor
-time of the uniform grid of equal points, nodes of the map chosen for that error too, whose lambda is as
-near, and its force's true error. PROGRAM is the fluxform binary; without it the release build is made and
+time of the uniform grid of equal points, nodes of the map chosen for that error too, from which on lambda
+is as near, and its force's true error. PROGRAM is the fluxform binary; without it the release build is made and
 used. Needs numpy.
 """
 
@@ -162,7 +162,9 @@ def main():
                 of = scene.at_error(error)
                 # The reference is not believed beyond this.
                 near = max(of["lambda_true"], 1e-6)
-                reaching = next((grid for grid in uniform if grid[1] <= near), None)
+                # A coarse grid may be near by luck: every finer one is to be as near too.
+                finer = [grid for at, grid in enumerate(uniform) if all(one[1] <= near for one in uniform[at:])]
+                reaching = finer[0] if finer else None
                 points, _, grid = reaching or uniform[-1]
                 # Nodes as the budget chooses them: the error of given points is said, and they are obeyed.
                 if points not in costs:

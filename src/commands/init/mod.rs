@@ -263,9 +263,11 @@ fn shape_of(object: Object, design: &Design) -> Table {
     }
     let points = [("x_mm", space.x_m), ("y_mm", space.y_m)]
         .map(|(key, along)| (key.to_owned(), axis([along.from, along.to], along.samples)));
+    // Of a grid those of its border stand for less: alike they would be off by the first power of the spacing.
+    let weights = ("weights".to_owned(), text("area"));
     table.insert(
         "points".to_owned(),
-        Value::Table(points.into_iter().collect()),
+        Value::Table(points.into_iter().chain([weights]).collect()),
     );
     table
 }
