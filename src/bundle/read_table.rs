@@ -226,20 +226,38 @@ fn find_columns(
     expected: &[&str],
 ) -> Result<Vec<usize>, TableError> {
     let mut places = Vec::new();
-    let mut faults = Vec::new();
+    let (mut faults, mut missing) = (Vec::new(), Vec::new());
     for column in expected {
         let mut found = header.iter().enumerate().filter(|(_, cell)| cell == column);
         match (found.next(), found.next()) {
             (Some((place, _)), None) => places.push(place),
-            (Some(_), Some(_)) => faults.push(format!("{name}:1: column {column} stands twice")),
-            (None, _) => {
-                let shown: String = header.join(",").chars().take(120).collect();
-                faults.push(format!(
-                    "{name}:1: column {column} is missing; expected a header line with {}, found {shown:?}",
-                    expected.join(",")
-                ));
-            }
+            (Some(_), Some(_)) => faults.push(format!("{name}:1: column {column} appears twice")),
+            (None, _) => missing.push(*column),
         }
+    }
+    if !missing.is_empty() {
+        let shown: String = header.join(",").chars().take(120).collect();
+        let (noun, are) = if missing.len() == 1 {
+            ("column", "is")
+        } else {
+            ("columns", "are")
+        };
+        let in_mm = |column: &&str| {
+            let stem = column.strip_suffix("_m")?;
+            header.iter().find(|cell| **cell == format!("{stem}_mm"))
+        };
+        let cure = if missing.iter().any(|column| in_mm(column).is_some()) {
+            "; lengths are in m: divide those in mm by 1000"
+        } else if header.len() == 1 && shown.contains([';', '\t']) {
+            "; columns are separated by commas"
+        } else {
+            ""
+        };
+        faults.push(format!(
+            "{name}:1: {noun} {} {are} missing; expected a header line with {}, found {shown:?}{cure}",
+            missing.join(", "),
+            expected.join(",")
+        ));
     }
     if faults.is_empty() {
         Ok(places)

@@ -116,6 +116,7 @@ impl Failure {
                     .map(|p| shown_path(p))
                     .collect();
                 match named.as_slice() {
+                    [] if !path.exists() => format!("{}: no such folder", shown_path(path)),
                     [] => self.to_string(),
                     _ => format!("{self}; the bundles below it: {}", named.join(", ")),
                 }

@@ -54,6 +54,19 @@ const MISTAKES: &[Mistake] = &[
         3,
         &["the table is empty", "x_m,y_m,z_m"],
     ),
+    (
+        &["probe", SEED, "millimetres.csv"],
+        3,
+        &[
+            "columns x_m, y_m, z_m are missing",
+            "divide those in mm by 1000",
+        ],
+    ),
+    (
+        &["probe", SEED, "nameless.csv"],
+        3,
+        &["columns x_m, y_m, z_m are missing", "separated by commas"],
+    ),
     (&["probe", SEED, "header.csv"], 3, &["a header and no rows"]),
     (&["probe", SEED, "many.csv"], 3, &["and 25 faults more"]),
     // Numbers of other notations.
@@ -111,6 +124,11 @@ const MISTAKES: &[Mistake] = &[
         &["is not a bundle", "bundles below it: results/seed_air/flat"],
     ),
     (
+        &["verify", "results/no_such"],
+        3,
+        &["results/no_such: no such folder"],
+    ),
+    (
         &["replay", "results/seed_air", "walk.csv"],
         3,
         &["bundles below it: results/seed_air/flat"],
@@ -131,6 +149,8 @@ fn prepared() -> Place {
     let place = Place::new();
     let table = |name: &str, text: &str| place.write(name, text);
     table("semicolons.csv", "x_m;y_m;z_m\n0,1;0,2;0,3\n0,1;0,2;0,3\n");
+    table("millimetres.csv", "x_mm,y_mm,z_mm\n0,0,30\n");
+    table("nameless.csv", "x;y;z\n0,1;0,2;0,3\n");
     table("tabs.csv", "x_m\ty_m\tz_m\n0.1\t0.2\t0.3\n");
     table("commas.csv", "x_m,y_m,z_m\n0,1,0,2,0,3\n");
     table("quoted.csv", "x_m,y_m,z_m\n\"0,1\",0.2,0.3\n");
