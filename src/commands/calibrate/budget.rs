@@ -15,6 +15,7 @@ use crate::commands::lambda::map_error::MapEffect;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::passive_map::PassiveMap;
+use crate::shape::certificate::Certify;
 use crate::shape::points::ConstraintPoints;
 
 impl Calibration<'_> {
@@ -52,13 +53,8 @@ impl Calibration<'_> {
         let cached = (self.field).search("heights", &chosen.document, opened.inputs(), target);
         let samples = cached.remember(|| {
             fewest_divisions(&chosen.document, progress, |tried| {
-                let heights = PointsOptions {
-                    marks: false,
-                    ..PointsOptions::default()
-                };
-                let report = opened.discretize(tried, &heights, None, progress)?;
-                let between = between_points(&report).0;
-                Ok(between.map(|part| part.error / target.between_points()))
+                let between = opened.between_points(tried, &PointsOptions::default(), progress)?;
+                Ok(between.map(|error| error / target.between_points()))
             })
         })?;
         let divided = chosen.document.with_samples(samples);
@@ -67,6 +63,16 @@ impl Calibration<'_> {
         }
         // Creases decide in which direction a force along the normal points there.
         let marks = self.force().along_normal().is_some();
+        let heights_alone = PointsOptions {
+            marks,
+            certify: Certify::No,
+            ..PointsOptions::default()
+        };
+        let uncertified = opened.discretize(&divided, &heights_alone, None, progress)?;
+        // Where the surface jumps no certificate decides how far heights are off.
+        if between_points(&uncertified).1.is_some() {
+            return Ok(Some(uncertified));
+        }
         opened
             .discretize_cached(("heights", &divided, marks), self.field, progress)
             .map(Some)

@@ -298,9 +298,8 @@ pub fn run_with(
         .filter(|target| target.refine || !document.grid_is_given);
     if let Some(target) = chosen {
         let (samples, _) = fewest_points(&document, target, progress, |tried| {
-            let report = opened.discretize(tried, options, None, progress)?;
-            let between = between_points(&report).0;
-            Ok(between.map(|part| part.error / target.error))
+            let between = opened.between_points(tried, options, progress)?;
+            Ok(between.map(|error| error / target.error))
         })?;
         document = Cow::Owned(document.with_samples(samples));
     }
@@ -420,6 +419,34 @@ impl OpenedSurface {
             cached.keep(certificate);
         }
         Ok(report)
+    }
+
+    /// What heights between the points of `document` add, as [`between_points`] of its grid states it; `None` where
+    /// no force is requested. Where the surface jumps no certificate decides it, and none is computed.
+    ///
+    /// # Errors
+    /// As [`run_with`].
+    pub(crate) fn between_points(
+        &self,
+        document: &ShapeDocument,
+        options: &PointsOptions,
+        progress: &dyn Progress,
+    ) -> Result<Option<f64>, RunError> {
+        let certified = PointsOptions {
+            marks: false,
+            ..*options
+        };
+        let heights_alone = PointsOptions {
+            certify: Certify::No,
+            ..certified
+        };
+        let estimated = self.discretize(document, &heights_alone, None, progress)?;
+        let (mut part, jumps) = between_points(&estimated);
+        if jumps.is_none() && certified.certify != Certify::No {
+            let report = self.discretize(document, &certified, None, progress)?;
+            part = between_points(&report).0;
+        }
+        Ok(part.map(|part| part.error))
     }
 
     /// The certificate of one of the last grids.
