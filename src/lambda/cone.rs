@@ -6,7 +6,7 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::model::{Factor, Model};
+use super::basis::Basis;
 
 /// How a variable may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,37 +23,31 @@ pub(super) enum Role {
     Falling,
 }
 
-/// The minimiser of `|target - A d|` over the cone with `w'd = 0`.
+/// The minimiser of `|slope - A d|` over the cone with `w'd = 0`; the basis holds what moves.
 pub(super) struct Direction {
     /// d.
     pub rate: Vec<Num>,
-    /// `target - A d`.
-    pub residual: Vec<Num>,
-    /// Reduced gradients `A'(residual) - nu w`.
+    /// Reduced gradients `A'(slope - A d) - nu w`.
     pub gradient: Vec<Num>,
-    /// Factor of the variables that move.
-    pub factor: Factor,
     /// One-sided variables that rounding alone would let in.
     pub blocked: Vec<bool>,
     /// False when the iteration limit was met: the direction is not the minimiser.
     pub converged: bool,
 }
 
-/// Minimises `|target - A d|`; starts with the one-sided variables that are `likely` to move.
-pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Num]) -> Direction {
-    let count = model.count();
-    let target_norm = Num::dot(target, target).sqrt();
+/// Minimises `|slope - A d|`; starts with the one-sided variables that are `likely` to move.
+pub(super) fn solve(basis: &mut impl Basis, roles: &[Role], likely: &[bool]) -> Direction {
+    let count = basis.model().count();
+    let slope = &basis.target().slope;
+    let slope_norm = Num::dot(slope, slope).sqrt();
     let with_role = |role: Role| (0..count).filter(move |&i| roles[i] == role);
-    let mut basis: Vec<usize> = with_role(Role::Free).chain(with_role(Role::Held)).collect();
-    if basis.is_empty() && model.weight.is_some() {
-        basis.extend(first_of_the_sum(model, roles, target));
+    let mut moving: Vec<usize> = with_role(Role::Free).chain(with_role(Role::Held)).collect();
+    if moving.is_empty() {
+        moving.extend(first_of_the_sum(basis, roles));
     }
-    basis.extend(
-        (0..count)
-            .filter(|&i| likely[i] && !basis.contains(&i))
-            .collect::<Vec<_>>(),
-    );
-    let mut factor = Factor::new(model, &basis);
+    let first = moving.first().copied();
+    moving.extend((0..count).filter(|&i| likely[i] && first != Some(i)));
+    basis.set(&moving);
     let mut rate = vec![Num::ZERO; count];
     let mut blocked = vec![false; count];
     // The variable that has just entered, and is not yet known to move the right way.
@@ -61,34 +55,33 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
     let limit = 30 * (count + 3);
     for _ in 0..limit {
         fluxform_base::progress::poll();
-        let candidate = factor.solve(model, target, Num::ZERO);
-        if let Some(violators) = step(roles, &basis, &mut rate, &candidate.x) {
+        let goal = basis.rates();
+        if let Some(violators) = step(roles, &moving, &mut rate, &goal) {
             match entered {
                 // In exact arithmetic a variable enters in the direction of its gradient.
                 Some(i) if violators.contains(&i) => {
                     blocked[i] = true;
-                    basis.retain(|&j| j != i);
+                    moving.retain(|&j| j != i);
                 }
-                _ => basis.retain(|j| !violators.contains(j)),
+                _ => moving.retain(|j| !violators.contains(j)),
             }
-            if basis.is_empty() && model.weight.is_some() {
-                basis.extend(first_of_the_sum(model, roles, target));
+            if moving.is_empty() {
+                moving.extend(first_of_the_sum(basis, roles));
             }
             entered = None;
-            factor = factor.of(model, &basis);
+            basis.set(&moving);
             continue;
         }
         if entered.take().is_some() {
             blocked.fill(false);
         }
-        let gradient = factor.gradient(model, &candidate.residual);
-        for i in most_wanted(model, roles, &gradient, &factor, target_norm) {
-            if blocked[i] || basis.contains(&i) {
+        let gradient = basis.gradient_rates();
+        for i in most_wanted(basis, roles, &gradient, slope_norm) {
+            if blocked[i] || moving.contains(&i) {
                 continue;
             }
-            if let Some(grown) = factor.with(model, &basis, i) {
-                factor = grown;
-                basis.push(i);
+            if basis.add(&moving, i) {
+                moving.push(i);
                 entered = Some(i);
                 break;
             }
@@ -97,30 +90,26 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
         if entered.is_none() {
             return Direction {
                 rate,
-                residual: candidate.residual,
                 gradient,
-                factor,
                 blocked,
                 converged: true,
             };
         }
     }
-    let last = factor.solve(model, target, Num::ZERO);
-    let gradient = factor.gradient(model, &last.residual);
     Direction {
-        rate: last.x,
-        residual: last.residual,
-        gradient,
-        factor,
+        rate: basis.rates(),
+        gradient: basis.gradient_rates(),
         blocked,
         converged: false,
     }
 }
 
-/// Where nothing two-sided carries the equality: the variable whose multiplier leaves
+/// Where there is an equality and nothing two-sided carries it: the variable whose multiplier leaves
 /// every rising one satisfied (or, without rising ones, every falling one).
-fn first_of_the_sum(model: &Model, roles: &[Role], target: &[Num]) -> Option<usize> {
-    let pressure = |i: usize| Num::dot(model.column(i), target) / model.weight_of(i);
+fn first_of_the_sum(basis: &impl Basis, roles: &[Role]) -> Option<usize> {
+    let (model, slope) = (basis.model(), &basis.target().slope);
+    model.weight.as_ref()?;
+    let pressure = |i: usize| Num::dot(model.filled(i), slope) / model.weight_of(i);
     let with_role = |role: Role| (0..roles.len()).filter(move |&i| roles[i] == role);
     with_role(Role::Rising)
         .reduce(|p, i| if pressure(i) > pressure(p) { i } else { p })
@@ -138,9 +127,9 @@ fn moves_wrongly(role: Role, rate: Num) -> bool {
 }
 
 /// Moves `rate` to `goal`, or as far as the signs allow; then the variables that stopped it.
-fn step(roles: &[Role], basis: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> Option<Vec<usize>> {
+fn step(roles: &[Role], moving: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> Option<Vec<usize>> {
     let mut share: Option<Num> = None;
-    for &i in basis.iter().filter(|&&i| moves_wrongly(roles[i], goal[i])) {
+    for &i in moving.iter().filter(|&&i| moves_wrongly(roles[i], goal[i])) {
         let reach = rate[i] / (rate[i] - goal[i]);
         share = Some(share.map_or(reach, |s| s.smaller(reach)));
     }
@@ -150,7 +139,7 @@ fn step(roles: &[Role], basis: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> O
         return None;
     };
     let mut stopped = Vec::new();
-    for &i in basis {
+    for &i in moving {
         if moves_wrongly(roles[i], goal[i]) && rate[i] / (rate[i] - goal[i]) <= share {
             stopped.push(i);
         }
@@ -166,15 +155,14 @@ fn step(roles: &[Role], basis: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> O
 
 /// The one-sided variables that gain by moving, largest relative gain first.
 fn most_wanted(
-    model: &Model,
+    basis: &impl Basis,
     roles: &[Role],
     gradient: &[Num],
-    factor: &Factor,
-    target_norm: Num,
+    slope_norm: Num,
 ) -> Vec<usize> {
-    let noise = factor.noise(model) * target_norm.to_f64();
-    let mut wanted: Vec<(usize, f64)> = factor
-        .gradient_scales(model)
+    let noise = basis.noise() * slope_norm.to_f64();
+    let mut wanted: Vec<(usize, f64)> = basis
+        .gradient_scales()
         .iter()
         .enumerate()
         .filter_map(|(i, scale)| {
@@ -193,6 +181,9 @@ fn most_wanted(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::basis::{QrBasis, Target};
+    use crate::model::Model;
+    use crate::tableau::{Products, Tableau};
 
     fn numbers(values: &[f64]) -> Vec<Num> {
         values.iter().map(|&v| Num::exactly(v)).collect()
@@ -220,16 +211,24 @@ mod tests {
     }
 
     fn assert_direction(model: &Model, roles: &[Role; 4], likely: &[bool; 4], target: &[f64]) {
-        let d = solve(model, roles, likely, &numbers(target));
-        assert!(d.converged);
-        let mut residual = numbers(target);
+        let target = Target::along(&numbers(target));
+        assert_minimiser(QrBasis::new(model, target.clone()), roles, likely);
+        let products = Products::new(model);
+        assert_minimiser(Tableau::new(model, target, &products, 10.0), roles, likely);
+    }
+
+    fn assert_minimiser(mut basis: impl Basis, roles: &[Role; 4], likely: &[bool; 4]) {
+        let d = solve(&mut basis, roles, likely);
+        let model = basis.model();
+        assert!(d.converged, "{roles:?} {likely:?} {:?}", model.weight);
+        let mut residual = basis.target().slope.clone();
         let mut sum = Num::ZERO;
         for i in 0..4 {
             Num::add_scaled(&mut residual, -d.rate[i], model.column(i));
             sum += model.weight_of(i) * d.rate[i];
         }
         assert!(sum.abs().to_f64() < 1e-28);
-        for (a, b) in residual.iter().zip(&d.residual) {
+        for (a, b) in residual.iter().zip(&basis.residual_rate(&d.rate)) {
             assert!((*a - *b).abs().to_f64() < 1e-28);
         }
         for (i, &role) in roles.iter().enumerate() {
@@ -276,13 +275,10 @@ mod tests {
     #[test]
     fn a_copied_column_is_held_still() {
         let model = Model::new(2, numbers(&[0.7, 1.3, 0.7, 1.3]), None, Num::EPSILON);
-        let d = solve(
-            &model,
-            &[Role::Free, Role::Held],
-            &[false; 2],
-            &numbers(&[1.1, 0.4]),
-        );
-        assert!(d.factor.contains(0) && !d.factor.contains(1));
+        let target = Target::along(&numbers(&[1.1, 0.4]));
+        let mut basis = QrBasis::new(&model, target);
+        let d = solve(&mut basis, &[Role::Free, Role::Held], &[false; 2]);
+        assert_eq!(basis.members(), &[0]);
         assert_eq!(d.rate[1], Num::ZERO);
     }
 
@@ -293,7 +289,8 @@ mod tests {
         for target in [[0.7, -1.3, 0.4], [-0.9, 0.1, 1.6], [-1.1, -0.6, -0.2]] {
             let target = numbers(&target);
             for (role, sign) in [(Role::Rising, 1.0), (Role::Falling, -1.0)] {
-                let first = first_of_the_sum(&model, &[role; 4], &target).unwrap();
+                let basis = QrBasis::new(&model, Target::along(&target));
+                let first = first_of_the_sum(&basis, &[role; 4]).unwrap();
                 let pull = |i: usize| Num::dot(model.column(i), &target).to_f64();
                 let weight = |i: usize| model.weight_of(i).to_f64();
                 let multiplier = pull(first) / weight(first);
@@ -303,9 +300,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(
-            first_of_the_sum(&model, &[Role::Fixed; 4], &numbers(&[0.7; 3])),
-            None
-        );
+        let basis = QrBasis::new(&model, Target::along(&numbers(&[0.7; 3])));
+        assert_eq!(first_of_the_sum(&basis, &[Role::Fixed; 4]), None);
     }
 }

@@ -259,6 +259,7 @@ mod tests {
         let follower = Follower {
             model: &coils,
             bounds: &free,
+            condition: None,
         };
         let mut path = follower.path(None, &numbers(&[0.0, 1.0]));
         // Half a thousand amperes a unit, and as much the other way.

@@ -9,11 +9,16 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
+use super::basis::{Basis, QrBasis, Target};
 use super::cone::{self, Role};
 use super::model::Model;
+use super::tableau::{self, Products, Tableau};
 
 /// Relative distance from a bound or a zero multiplier that counts as none.
 const GRAIN: f64 = 1e-27;
+/// Largest flaw of a path by pivots: with more they have lost digits, and the path is followed by
+/// factorisations.
+const DRIFT: f64 = 1e-16;
 
 /// Bounds of the variables; `None`: unbounded on that side.
 #[derive(Debug, Clone)]
@@ -66,13 +71,11 @@ pub(super) struct Trace {
     pub pieces: Vec<Piece>,
     /// False when the iteration limit was met: the last piece is not the minimiser.
     pub complete: bool,
-}
-
-/// A line of targets, `constant + lambda slope`.
-#[derive(Debug, Clone)]
-pub(super) struct Target {
-    pub constant: Vec<Num>,
-    pub slope: Vec<Num>,
+    /// Largest relative violation of the optimality conditions at the pieces' starts, and of
+    /// the residual's continuity: its square is the error that it leaves in e*.
+    pub flaw: f64,
+    /// Pivots made, where the basis was a tableau.
+    pub pivots: Option<usize>,
 }
 
 /// Values at one lambda, with the rates by which they were reached.
@@ -115,14 +118,35 @@ fn advance(value: &[Num], rate: &[Num], by: Num) -> Vec<Num> {
 pub(super) struct Follower<'a> {
     pub model: &'a Model,
     pub bounds: &'a Bounds,
+    /// Condition number of the columns where it is known.
+    pub condition: Option<f64>,
 }
 
 impl Follower<'_> {
     /// The path from the zero target at `lambda = 0`, where `x = 0` (the slack takes what
     /// the equality leaves), along `offset` first and then along `slope`.
     pub fn path(&self, offset: Option<&[Num]>, slope: &[Num]) -> Trace {
+        let condition = self.condition.filter(|&c| c <= tableau::MOST_CONDITION);
+        if let Some(condition) = condition {
+            let products = Products::new(self.model);
+            let basis = |target| Tableau::new(self.model, target, &products, condition);
+            let (mut trace, last) = self.path_on(basis, offset, slope);
+            trace.pivots = Some(last.pivots);
+            if trace.complete && trace.flaw <= DRIFT {
+                return trace;
+            }
+        }
+        let basis = |target| QrBasis::new(self.model, target);
+        self.path_on(basis, offset, slope).0
+    }
+
+    fn path_on<B: Basis>(
+        &self,
+        basis: impl Fn(Target) -> B,
+        offset: Option<&[Num]>,
+        slope: &[Num],
+    ) -> (Trace, B) {
         let count = self.model.count();
-        let zero = vec![Num::ZERO; self.model.rows];
         let mut state = State {
             lambda: Num::ZERO,
             place: (0..count).map(|i| self.place_of_zero(i)).collect(),
@@ -135,41 +159,28 @@ impl Follower<'_> {
         if self.model.weight.is_some() {
             state.x[count - 1] = self.bounds.total;
         }
-        let Some(offset) = offset else {
-            return self.follow(
-                state,
-                &Target {
-                    constant: zero,
-                    slope: slope.to_vec(),
-                },
-                None,
-            );
-        };
-        let approach = self.follow(
-            state,
-            &Target {
-                constant: zero,
-                slope: offset.to_vec(),
-            },
-            Some(Num::ONE),
-        );
-        let last = &approach.pieces[approach.pieces.len() - 1];
-        let state = State {
-            lambda: Num::ZERO,
-            place: last.place.clone(),
-            x: last.x_at(Num::ONE),
-            x_rate: vec![Num::ZERO; count],
-            gradient: last.gradient_at(Num::ONE),
-            gradient_rate: vec![Num::ZERO; count],
-            gradient_scale: last.gradient_scale.clone(),
-        };
-        let target = Target {
-            constant: offset.to_vec(),
-            slope: slope.to_vec(),
-        };
-        let mut trace = self.follow(state, &target, None);
-        trace.complete &= approach.complete;
-        trace
+        let mut target = Target::along(slope);
+        let mut arrived = true;
+        if let Some(offset) = offset {
+            let approach = self.follow(state, &mut basis(Target::along(offset)), Some(Num::ONE));
+            arrived = approach.complete;
+            let last = &approach.pieces[approach.pieces.len() - 1];
+            state = State {
+                lambda: Num::ZERO,
+                place: last.place.clone(),
+                x: last.x_at(Num::ONE),
+                x_rate: vec![Num::ZERO; count],
+                gradient: last.gradient_at(Num::ONE),
+                gradient_rate: vec![Num::ZERO; count],
+                gradient_scale: last.gradient_scale.clone(),
+            };
+            target.constant = offset.to_vec();
+        }
+        let mut basis = basis(target);
+        let mut trace = self.follow(state, &mut basis, None);
+        trace.complete &= arrived;
+        trace.flaw = self.flaw(&trace.pieces, offset, slope);
+        (trace, basis)
     }
 
     fn place_of_zero(&self, i: usize) -> VariableState {
@@ -187,12 +198,12 @@ impl Follower<'_> {
         }
     }
 
-    fn follow(&self, mut state: State, target: &Target, end: Option<Num>) -> Trace {
+    fn follow(&self, mut state: State, basis: &mut impl Basis, end: Option<Num>) -> Trace {
         let mut pieces: Vec<Piece> = Vec::new();
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
             fluxform_base::progress::poll();
-            let Some((piece, event)) = self.leave(&state, target) else {
+            let Some((piece, event)) = self.leave(&state, basis) else {
                 break;
             };
             let lambda = event.map(|step| piece.start + step);
@@ -214,23 +225,28 @@ impl Follower<'_> {
                     return Trace {
                         pieces,
                         complete: true,
+                        flaw: 0.0,
+                        pivots: None,
                     };
                 }
             }
         }
         if pieces.is_empty() {
-            pieces.push(self.standstill(&state, target));
+            pieces.push(self.standstill(&state, basis.target()));
         }
         Trace {
             pieces,
             complete: false,
+            flaw: 0.0,
+            pivots: None,
         }
     }
 
     /// The piece that begins at `state` and the step to its end, `None` for no end. An event
     /// that would end it at once makes its constraint one more that may change here.
-    fn leave(&self, state: &State, target: &Target) -> Option<(Piece, Option<Num>)> {
-        let mut roles = self.roles(state, target);
+    fn leave(&self, state: &State, basis: &mut impl Basis) -> Option<(Piece, Option<Num>)> {
+        let mut roles = self.roles(state, basis);
+        let tie = Num::of(self.tie(basis)) * state.lambda;
         for _ in 0..=2 * self.model.count() {
             fluxform_base::progress::poll();
             let likely: Vec<bool> = roles
@@ -241,15 +257,15 @@ impl Follower<'_> {
                         && matches!(place, VariableState::Low | VariableState::High)
                 })
                 .collect();
-            let direction = cone::solve(self.model, &roles, &likely, &target.slope);
+            let direction = cone::solve(basis, &roles, &likely);
             if !direction.converged {
                 return None;
             }
-            let piece = self.piece(state, target, &roles, &direction);
-            let Some((i, step, role)) = self.next_event(&piece, &roles, &direction, target) else {
+            let piece = self.piece(state, &roles, &direction, basis);
+            let Some((i, step, role)) = self.next_event(&piece, &roles, &direction, basis) else {
                 return Some((piece, None));
             };
-            if step > Num::of(self.tie()) * state.lambda || roles[i] == role {
+            if step > tie || roles[i] == role {
                 return Some((piece, Some(step)));
             }
             roles[i] = role;
@@ -257,17 +273,19 @@ impl Follower<'_> {
         None
     }
 
-    /// Relative distance in lambda below which two events are one: about the columns' error.
-    fn tie(&self) -> f64 {
-        100.0 * self.model.epsilon
+    /// Relative distance in lambda below which two events are one: about the error of the columns or
+    /// of the arithmetic.
+    fn tie(&self, basis: &impl Basis) -> f64 {
+        (100.0 * self.model.epsilon).max(basis.resolution())
     }
 
     /// Which variables may move where: those at a bound whose multiplier is zero, or will
     /// be at once, become one-sided, and so do those that meet a bound.
-    fn roles(&self, state: &State, target: &Target) -> Vec<Role> {
+    fn roles(&self, state: &State, basis: &impl Basis) -> Vec<Role> {
+        let target = basis.target();
         let size = norm(&target.constant) + state.lambda.abs() * norm(&target.slope);
-        let grain = Num::of(GRAIN);
-        let soon = Num::of(self.tie()) * state.lambda;
+        let grain = Num::of(basis.resolution().max(GRAIN));
+        let soon = Num::of(self.tie(basis)) * state.lambda;
         let slack = self.model.weight.as_ref().map(|_| self.model.count() - 1);
         (0..self.model.count())
             .map(|i| match state.place[i] {
@@ -312,15 +330,18 @@ impl Follower<'_> {
     fn piece(
         &self,
         state: &State,
-        target: &Target,
         roles: &[Role],
         direction: &cone::Direction,
+        basis: &impl Basis,
     ) -> Piece {
-        let factor = &direction.factor;
+        let mut moves = vec![false; roles.len()];
+        for &i in basis.members().iter().chain(&basis.pivot()) {
+            moves[i] = true;
+        }
         let place: Vec<VariableState> = (0..roles.len())
             .map(|i| match roles[i] {
                 Role::Fixed => state.place[i],
-                _ if factor.contains(i) => VariableState::Free,
+                _ if moves[i] => VariableState::Free,
                 Role::Free | Role::Held => VariableState::Held,
                 Role::Rising => VariableState::Low,
                 Role::Falling => VariableState::High,
@@ -332,56 +353,36 @@ impl Follower<'_> {
             VariableState::High => self.bounds.upper[i].unwrap_or(state.x[i]),
             VariableState::Free | VariableState::Held => state.x[i],
         };
-        let fixed = (0..roles.len())
-            .filter(|&i| place[i] != VariableState::Free)
-            .map(|i| (i, still(i)));
-        let (rest, total) = self
-            .model
-            .remainder(&target.constant, self.bounds.total, fixed);
-        let base = factor.solve(self.model, &rest, total);
-        let at = |base: Num, rate: Num| base + state.lambda * rate;
-        let x = (0..roles.len())
-            .map(|i| {
-                if place[i] == VariableState::Free {
-                    at(base.x[i], direction.rate[i])
-                } else {
-                    still(i)
-                }
-            })
-            .collect();
-        let x_rate = (0..roles.len())
-            .map(|i| {
-                if place[i] == VariableState::Free {
-                    direction.rate[i]
-                } else {
-                    Num::ZERO
-                }
-            })
-            .collect();
-        let residual: Vec<Num> = base
-            .residual
-            .iter()
-            .zip(&direction.residual)
-            .map(|(&b, &r)| at(b, r))
-            .collect();
-        let slope = norm(&target.slope);
+        let mut x_rate = direction.rate.clone();
+        let mut fixed = Vec::with_capacity(roles.len());
+        for i in (0..roles.len()).filter(|&i| place[i] != VariableState::Free) {
+            x_rate[i] = Num::ZERO;
+            fixed.push((i, still(i)));
+        }
+        let residual_rate = basis.residual_rate(&x_rate);
+        let rates = (&x_rate[..], &residual_rate[..]);
+        let mut values = basis.values(state.lambda, self.bounds.total, &fixed, rates);
+        for &(i, x) in &fixed {
+            values.x[i] = x;
+        }
+        let slope = norm(&basis.target().slope);
         let share = if slope > Num::ZERO {
-            (norm(&direction.residual) / slope).to_f64()
+            (norm(&residual_rate) / slope).to_f64()
         } else {
             0.0
         };
         Piece {
             start: state.lambda,
-            gradient: factor.gradient(self.model, &residual),
+            gradient: values.gradient,
             gradient_rate: direction.gradient.clone(),
-            gradient_scale: factor.gradient_scales(self.model),
-            noise: factor.noise(self.model),
-            blur: factor.blur(self.model, share),
+            gradient_scale: basis.gradient_scales(),
+            noise: basis.noise(),
+            blur: basis.blur(share),
             place,
-            x,
+            x: values.x,
             x_rate,
-            residual,
-            residual_rate: direction.residual.clone(),
+            residual: values.residual,
+            residual_rate,
         }
     }
 
@@ -392,9 +393,9 @@ impl Follower<'_> {
         piece: &Piece,
         roles: &[Role],
         direction: &cone::Direction,
-        target: &Target,
+        basis: &impl Basis,
     ) -> Option<(usize, Num, Role)> {
-        let slope = norm(&target.slope);
+        let slope = norm(&basis.target().slope);
         let mut first: Option<(usize, Num, Role)> = None;
         let mut offer = |i: usize, distance: Num, rate: Num, role: Role| {
             let step = distance.larger(Num::ZERO) / rate;
@@ -407,9 +408,7 @@ impl Follower<'_> {
                 VariableState::Free => {
                     let rate = piece.x_rate[i];
                     let rates = &piece.x_rate;
-                    let still = direction
-                        .factor
-                        .rate_noise(self.model, i, rates, slope, piece.blur);
+                    let still = basis.rate_noise(i, rates, slope, piece.blur);
                     if rate.abs() <= still {
                         continue;
                     }
@@ -441,11 +440,10 @@ impl Follower<'_> {
         first
     }
 
-    /// Largest relative violation of the optimality conditions at the pieces' starts, and of
-    /// the residual's continuity: its square is the error that it leaves in e*.
-    pub(crate) fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
+    /// As [`Trace::flaw`] says.
+    fn flaw(&self, pieces: &[Piece], offset: Option<&[Num]>, slope: &[Num]) -> f64 {
         let mut worst = Num::ZERO;
-        for (k, piece) in trace.pieces.iter().enumerate() {
+        for (k, piece) in pieces.iter().enumerate() {
             let size = offset.map_or(Num::ZERO, norm) + piece.start * norm(slope);
             if size <= Num::ZERO {
                 continue;
@@ -463,11 +461,14 @@ impl Follower<'_> {
                 match piece.place[i] {
                     VariableState::Low if scale > Num::ZERO => see(piece.gradient[i] / scale),
                     VariableState::High if scale > Num::ZERO => see(-(piece.gradient[i] / scale)),
+                    VariableState::Free if scale > Num::ZERO => {
+                        see((piece.gradient[i] / scale).abs());
+                    }
                     _ => {}
                 }
             }
             if k > 0 {
-                let reached = trace.pieces[k - 1].residual_at(piece.start);
+                let reached = pieces[k - 1].residual_at(piece.start);
                 let jump: Vec<Num> = reached
                     .iter()
                     .zip(&piece.residual)
@@ -523,6 +524,7 @@ mod tests {
         let follower = Follower {
             model: &model,
             bounds: &bounds,
+            condition: None,
         };
         let path = |size: f64| follower.path(None, &numbers(&[0.7 * size, 1.9 * size, 1.6 * size]));
         let one = path(1.0);

@@ -49,6 +49,7 @@
 //! ```
 
 mod allocation;
+mod basis;
 mod certificate;
 mod cone;
 mod criteria;
@@ -64,6 +65,7 @@ mod qr_reduction;
 mod rest;
 pub mod sideways;
 mod solve;
+mod tableau;
 pub mod two_fingers;
 pub mod uncertainty;
 mod vector_allocation;

@@ -11,6 +11,8 @@ pub(super) struct Model {
     /// Length of a column.
     pub rows: usize,
     columns: Vec<Num>,
+    /// Entries of each column up to its last that is not zero.
+    filled: Vec<usize>,
     /// Euclidean norms of the columns.
     pub norm: Vec<Num>,
     /// Positive weights of the equality, if there is one.
@@ -18,9 +20,6 @@ pub(super) struct Model {
     /// Relative error of the columns themselves.
     pub epsilon: f64,
 }
-
-/// Rates above this share of the target are never taken for rounding.
-const MOST_BLUR: f64 = 1e-9;
 
 /// A column whose part outside the span of the others is below this share depends on them:
 /// exact copies leave 1e-31, and no two different columns of doubles come near it.
@@ -35,9 +34,14 @@ impl Model {
             .chunks_exact(rows)
             .map(|c| Num::dot(c, c).sqrt())
             .collect();
+        let last = |c: &[Num]| c.iter().rposition(|&v| v != Num::ZERO);
+        let filled = (columns.chunks_exact(rows))
+            .map(|c| last(c).map_or(0, |last| last + 1))
+            .collect();
         Self {
             rows,
             columns,
+            filled,
             norm,
             weight,
             epsilon,
@@ -52,6 +56,11 @@ impl Model {
     /// Column `i`.
     pub fn column(&self, i: usize) -> &[Num] {
         &self.columns[i * self.rows..(i + 1) * self.rows]
+    }
+
+    /// Column `i` without the zeros at its end.
+    pub fn filled(&self, i: usize) -> &[Num] {
+        &self.column(i)[..self.filled[i]]
     }
 
     /// Weight of variable `i` in the equality, 0 without one.
@@ -69,7 +78,7 @@ impl Model {
         let (mut rest, mut left) = (target.to_vec(), total);
         for (i, x) in fixed {
             if x != Num::ZERO {
-                Num::add_scaled(&mut rest, -x, self.column(i));
+                Num::add_scaled(&mut rest, -x, self.filled(i));
                 left -= self.weight_of(i) * x;
             }
         }
@@ -124,11 +133,12 @@ impl Factor {
         factor
     }
 
-    /// The factor of `variables`: what this one has of them in the same order, up to the first
-    /// difference, is not factorised again.
-    pub fn of(self, model: &Model, variables: &[usize]) -> Self {
+    /// Becomes the factor of `variables`: what this one has of them in the same order, up to the
+    /// first difference, is not factorised again.
+    pub fn change_to(&mut self, model: &Model, variables: &[usize]) {
         if self.pivot != Self::pivot_of(model, variables) {
-            return Self::new(model, variables);
+            *self = Self::new(model, variables);
+            return;
         }
         // Variables that this factor left out are tried again where they differ.
         let mut members = self.members.iter().peekable();
@@ -142,17 +152,11 @@ impl Factor {
             }
             shared += 1;
         }
-        let mut factor = self;
-        factor.truncate(shared);
-        let rest = variables
-            .iter()
-            .filter(|&&i| !factor.members.contains(&i))
-            .copied()
-            .collect::<Vec<_>>();
-        for i in rest {
-            factor.push(model, i);
+        self.truncate(shared);
+        let is_new = |i: &&usize| !self.members.contains(i);
+        for i in variables.iter().filter(is_new).copied().collect::<Vec<_>>() {
+            self.push(model, i);
         }
-        factor
     }
 
     /// Leaves the first `rank` members.
@@ -166,7 +170,7 @@ impl Factor {
     }
 
     /// The variable of the smallest column per weight, with an equality.
-    fn pivot_of(model: &Model, variables: &[usize]) -> Option<usize> {
+    pub fn pivot_of(model: &Model, variables: &[usize]) -> Option<usize> {
         model.weight.as_ref().and_then(|w| {
             let per_weight = |i: usize| model.norm[i] / w[i];
             variables
@@ -253,9 +257,19 @@ impl Factor {
         self.pivot == Some(variable) || self.members.contains(&variable)
     }
 
-    /// Relative size of the gradients that errors of the columns leave where zero is meant.
-    pub fn noise(&self, model: &Model) -> f64 {
-        (4 * self.rows) as f64 * model.epsilon / self.independence
+    /// Variables in the order of their columns, the pivot not among them.
+    pub fn members(&self) -> &[usize] {
+        &self.members
+    }
+
+    /// The variable by which the equality is eliminated.
+    pub fn pivot(&self) -> Option<usize> {
+        self.pivot
+    }
+
+    /// Smallest share of a member's column that lies outside the span of those before it.
+    pub fn independence(&self) -> f64 {
+        self.independence
     }
 
     fn push(&mut self, model: &Model, variable: usize) {
@@ -358,47 +372,11 @@ impl Factor {
             Num::dot(model.column(p), residual) / model.weight_of(p)
         });
         let mut gradient: Vec<Num> = (0..model.count())
-            .map(|i| Num::dot(model.column(i), residual) - nu * model.weight_of(i))
+            .map(|i| Num::dot(model.filled(i), residual) - nu * model.weight_of(i))
             .collect();
         for &i in self.members.iter().chain(&self.pivot) {
             gradient[i] = Num::ZERO;
         }
         gradient
-    }
-
-    /// Natural sizes of the reduced gradients per unit of residual.
-    pub(crate) fn gradient_scales(&self, model: &Model) -> Vec<Num> {
-        let shift = self
-            .pivot
-            .map_or(Num::ZERO, |p| model.norm[p] / model.weight_of(p));
-        (0..model.count())
-            .map(|i| model.norm[i] + model.weight_of(i) * shift)
-            .collect()
-    }
-
-    /// Size of a rate that rounding leaves where variable `i` should not move; `blur` is
-    /// the same relative to the target.
-    pub(crate) fn rate_noise(
-        &self,
-        model: &Model,
-        i: usize,
-        rates: &[Num],
-        target_norm: Num,
-        blur: f64,
-    ) -> Num {
-        let mut scale = target_norm;
-        if self.pivot == Some(i) {
-            let moved = self.members.iter().fold(Num::ZERO, |s, &j| {
-                s + model.weight_of(j) * (rates[j].abs() + target_norm)
-            });
-            scale = scale.larger(moved / model.weight_of(i));
-        }
-        scale * Num::of(blur)
-    }
-
-    /// The same of the rates: a residual of the given share of the
-    /// target is felt with the square of the condition.
-    pub(crate) fn blur(&self, model: &Model, residual_share: f64) -> f64 {
-        (self.noise(model) * (1.0 + residual_share / self.independence)).min(MOST_BLUR)
     }
 }

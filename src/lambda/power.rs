@@ -8,6 +8,7 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
+use super::basis::{Basis, QrBasis, Target};
 use super::cone::{self, Role};
 use super::homotopy::{Bounds, Piece, VariableState};
 use super::model::{Factor, Model};
@@ -155,18 +156,15 @@ impl Constraints {
         let model = Model::new(size + 1, columns, None, Num::EPSILON);
         let mut target = vec![Num::ZERO; size + 1];
         target[size] = Num::ONE;
-        let found = cone::solve(
-            &model,
-            &vec![Role::Rising; count],
-            &vec![false; count],
-            &target,
-        );
-        let height = found.residual[size];
+        let mut basis = QrBasis::new(&model, Target::along(&target));
+        let found = cone::solve(&mut basis, &vec![Role::Rising; count], &vec![false; count]);
+        let residual = basis.residual_rate(&found.rate);
+        let height = residual[size];
         if !found.converged || height.to_f64() <= 1e-15 {
             return None;
         }
         Some(
-            found.residual[..size]
+            residual[..size]
                 .iter()
                 .map(|&r| -(r / height) * unit)
                 .collect(),

@@ -180,19 +180,25 @@ impl Reduced {
     /// length; infinite where they depend on each other.
     pub fn condition(&self) -> f64 {
         let n = self.coils;
-        let unit = |j: usize, i: usize| {
-            let column = &self.columns[j];
-            (column[i] / Num::dot(column, column).sqrt()).to_f64()
-        };
+        let units: Vec<Vec<f64>> = self.columns[..n]
+            .iter()
+            .enumerate()
+            .map(|(j, column)| {
+                let norm = Num::dot(column, column).sqrt();
+                column[..=j].iter().map(|&v| (v / norm).to_f64()).collect()
+            })
+            .collect();
         let mut total = 0.0;
         for k in 0..n {
             // Column k of the inverse, by back substitution.
             let mut inverse = vec![0.0; k + 1];
+            inverse[k] = 1.0;
             for i in (0..=k).rev() {
-                let known: f64 = (i + 1..=k).map(|j| unit(j, i) * inverse[j]).sum();
-                inverse[i] = (if i == k { 1.0 } else { 0.0 } - known) / unit(i, i);
+                inverse[i] /= units[i][i];
+                let value = inverse[i];
+                f64::add_scaled(&mut inverse[..i], -value, &units[i]);
             }
-            total += inverse.iter().map(|v| v * v).sum::<f64>();
+            total += f64::dot(&inverse, &inverse);
         }
         let condition = (n as f64 * total).sqrt();
         if condition.is_finite() {

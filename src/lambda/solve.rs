@@ -18,6 +18,8 @@ use super::worst;
 
 /// Above this condition number of the coils' columns doubles do not decide.
 const PLAIN_CONDITION: f64 = 1e3;
+/// Up to this condition number, found in doubles, no column depends on others within rounding.
+const INDEPENDENT: f64 = 1e10;
 /// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
 const PLAIN_ERROR: f64 = 2e-14;
 /// Largest relative violation of optimality that is taken for rounding: its square counts.
@@ -99,39 +101,66 @@ struct Solved {
     flaw: f64,
 }
 
+/// The path without the drivers' size.
+struct Unlimited {
+    bounds: Bounds,
+    trace: Trace,
+    /// Rounding in e* on it, relative to `lambda^2 mean(h^2)`.
+    error: f64,
+}
+
+impl Unlimited {
+    fn new(problem: &ForceProblem, reduced: &Reduced, condition: Option<f64>) -> Self {
+        let (model, bounds) = reduced.unlimited(problem);
+        let follower = Follower {
+            model: &model,
+            bounds: &bounds,
+            condition,
+        };
+        let trace = follower.path(reduced.offset().as_deref(), reduced.heights());
+        let error = rounding(&model, &trace, reduced.heights());
+        Self {
+            bounds,
+            trace,
+            error,
+        }
+    }
+}
+
 impl Solved {
-    fn new(problem: &ForceProblem, reduced: Reduced) -> Self {
+    /// `condition`: of the coils' columns, where it is known.
+    fn new(problem: &ForceProblem, reduced: Reduced, condition: Option<f64>) -> Self {
+        let unlimited = Unlimited::new(problem, &reduced, condition);
+        Self::with(problem, reduced, condition, unlimited)
+    }
+
+    fn with(
+        problem: &ForceProblem,
+        reduced: Reduced,
+        condition: Option<f64>,
+        free: Unlimited,
+    ) -> Self {
         let offset = reduced.offset();
         let heights = reduced.heights();
         let (model, bounds) = reduced.limited(problem);
         let follower = Follower {
             model: &model,
             bounds: &bounds,
+            condition,
         };
         let mut limited = follower.path(offset.as_deref(), heights);
-        let (free_model, free_bounds) = reduced.unlimited(problem);
-        let free = Follower {
-            model: &free_model,
-            bounds: &free_bounds,
-        };
-        let unlimited = free.path(offset.as_deref(), heights);
-        let flaw = follower
-            .flaw(&limited, offset.as_deref(), heights)
-            .max(free.flaw(&unlimited, offset.as_deref(), heights));
-        let size = Num::dot(heights, heights).sqrt();
-        let mut error =
-            rounding(&model, &limited, size).max(rounding(&free_model, &unlimited, size));
+        let mut error = rounding(&model, &limited, heights).max(free.error);
         if limited.complete && rest::bring_to_rest(&mut limited, offset.as_deref(), heights) {
             error += rest::COST;
         }
         Self {
             model,
             bounds,
-            free_bounds,
-            limited,
-            unlimited,
+            free_bounds: free.bounds,
             error,
-            flaw,
+            flaw: limited.flaw.max(free.trace.flaw),
+            limited,
+            unlimited: free.trace,
             reduced,
         }
     }
@@ -170,7 +199,8 @@ impl Solved {
 
 /// First-order effect of the columns' rounding on e*, at the breakpoints: the residual times
 /// the sum of all columns' contributions, and a margin for the sums over points.
-fn rounding(model: &Model, trace: &Trace, size: Num) -> f64 {
+fn rounding(model: &Model, trace: &Trace, heights: &[Num]) -> f64 {
+    let size = Num::dot(heights, heights).sqrt();
     let mut worst = 1.0_f64;
     for piece in &trace.pieces {
         // On the first piece everything grows with lambda: its rates will do.
@@ -206,33 +236,17 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    if let Some(plain) = solve_plainly(problem, &largest) {
-        let path = Path::new(problem, &plain.reduced, &plain.bounds, &plain.limited);
-        let rank = problem.coils();
-        return Ok(finish::<f64>(
-            problem,
-            &largest,
-            settings,
-            &plain,
-            path,
-            rank,
-            Precision::Double,
-        ));
-    }
-    let solved = solve_finely(problem, &largest);
-    let rank = solved.reduced.rank();
+    let (solved, rank, precision) = solve_paths(problem, &largest);
     let mut path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
     if rank < problem.coils() {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
-    Ok(finish::<Num>(
-        problem,
-        &largest,
-        settings,
-        &solved,
-        path,
-        rank,
-        Precision::DoubleDouble,
+    let finish = match precision {
+        Precision::Double => finish::<f64>,
+        Precision::DoubleDouble => finish::<Num>,
+    };
+    Ok(finish(
+        problem, &largest, settings, &solved, path, rank, precision,
     ))
 }
 
@@ -244,14 +258,7 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    let (solved, rank) = match solve_plainly(problem, &largest) {
-        Some(plain) => (plain, problem.coils()),
-        None => {
-            let solved = solve_finely(problem, &largest);
-            let rank = solved.reduced.rank();
-            (solved, rank)
-        }
-    };
+    let (solved, rank, _) = solve_paths(problem, &largest);
     let heights = solved.reduced.heights();
     let comparison = Comparison {
         limited: &solved.limited,
@@ -273,27 +280,46 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     })
 }
 
-/// Reduced in doubles, where that is enough.
-fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved> {
-    if problem.points() < problem.coils() || largest[..problem.coils()].contains(&0.0) {
+/// Both paths, the number of independent columns, and the arithmetic of their reduction.
+fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, usize, Precision) {
+    let coils = problem.coils();
+    let mut condition = None;
+    if problem.points() >= coils && !largest[..coils].contains(&0.0) {
+        let reduced = Reduced::new::<f64>(problem, largest);
+        let plain = reduced.condition();
+        condition = Some(plain).filter(|&condition| condition <= INDEPENDENT);
+        if plain <= PLAIN_CONDITION
+            && let Some(solved) = solve_plainly(problem, reduced, plain)
+        {
+            return (solved, coils, Precision::Double);
+        }
+    }
+    let reduced = Reduced::new::<Num>(problem, largest);
+    let solved = match condition {
+        Some(_) => Solved::new(problem, reduced, condition),
+        None => solve_dependent(problem, reduced),
+    };
+    let rank = condition.map_or_else(|| solved.reduced.rank(), |_| coils);
+    (solved, rank, Precision::DoubleDouble)
+}
+
+/// From the reduction in doubles; `None` where that is not enough.
+fn solve_plainly(problem: &ForceProblem, reduced: Reduced, condition: f64) -> Option<Solved> {
+    let free = Unlimited::new(problem, &reduced, Some(condition));
+    if free.error > PLAIN_ERROR {
         return None;
     }
-    let reduced = Reduced::new::<f64>(problem, largest);
-    if reduced.condition() > PLAIN_CONDITION {
-        return None;
-    }
-    let solved = Solved::new(problem, reduced);
+    let solved = Solved::with(problem, reduced, Some(condition), free);
     (solved.reliable() && solved.error <= PLAIN_ERROR).then_some(solved)
 }
 
-/// Reduced in double-double. Dependences that lie within the rounding of the forces are taken
-/// as exact, provided that this does not show in e*.
-fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved {
-    let reduced = Reduced::new::<Num>(problem, largest);
+/// Where columns may depend on each other: dependences that lie within the rounding of the forces are
+/// taken as exact, provided that this does not show in e*.
+fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> Solved {
     let clean = reduced.with_clean_dependences();
-    let literal = Solved::new(problem, reduced);
+    let literal = Solved::new(problem, reduced, None);
     if let Some(clean) = clean {
-        let clean = Solved::new(problem, clean);
+        let clean = Solved::new(problem, clean, None);
         if clean.reliable() && (clean.agrees_with(&literal) || !literal.reliable()) {
             return clean;
         }
