@@ -1,9 +1,44 @@
 //! The force constants of one object (eq. 10) and which of them is chosen: the one table of their
 //! names and meanings.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+use crate::units::{FAINT_FORCE_JND, FORCE_JND};
+
+/// The relative change of the force that a finger just notices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Jnd {
+    /// A part of the force.
+    Part(f64),
+    /// [`FORCE_JND`], or [`Jnd::FAINT`] where the requested force is below [`crate::units::FAINT_FORCE_N`].
+    ByForce,
+}
+
+impl Jnd {
+    /// Its name on the command line.
+    pub const BY_FORCE: &str = "by-force";
+    /// The least that is found for small forces.
+    pub const FAINT: f64 = FAINT_FORCE_JND[0];
+}
+
+impl Default for Jnd {
+    fn default() -> Self {
+        Self::Part(FORCE_JND)
+    }
+}
+
+impl fmt::Display for Jnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Part(part) => part.fmt(f),
+            Self::ByForce => f.write_str(Self::BY_FORCE),
+        }
+    }
+}
 
 /// Which force constant is chosen. Its name in artefacts and on the command line is the variant's
 /// in lower case, its meaning the first line of the variant's comment.

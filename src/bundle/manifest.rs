@@ -73,6 +73,9 @@ pub struct MadeWith {
     /// `--jnd`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jnd: Option<f64>,
+    /// `--jnd by-force`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub jnd_by_force: bool,
     /// `--at`, N/m; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_n_per_m: Option<f64>,

@@ -10,7 +10,7 @@ use crate::design::Design;
 use crate::digits::duration;
 use crate::heating::Heating;
 use crate::lambda::uncertainty::{CurrentsError, Study};
-use crate::lambda::{Criterion, GivenForce};
+use crate::lambda::{Criterion, GivenForce, Jnd};
 use crate::uncertainty::Cause;
 use crate::units::{FAINT_FORCE_JND, FAINT_FORCE_N, FORCE_JND};
 
@@ -143,6 +143,9 @@ pub fn chosen_by(file: &LambdaFile) -> String {
             number(least * 100.0),
             percent(most)
         ),
+        Criterion::Jnd if faint && file.jnd == Jnd::FAINT => {
+            format!("{by}, found below {} N", number(FAINT_FORCE_N))
+        }
         Criterion::Jnd | Criterion::Linear | Criterion::Saturation | Criterion::Maxmin => by,
     }
 }

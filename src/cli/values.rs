@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::bundle::atomic;
 use crate::choice::Choice;
+use crate::lambda::Jnd;
 use crate::plot::drawing::DrawingFormat;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{parse_unit, unit_names};
@@ -253,12 +254,17 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A part, or per cent with a `%`.
+fn part(text: &str) -> Result<f64, String> {
+    match text.trim().strip_suffix('%') {
+        Some(percent) => Ok(number(percent)? / 100.0),
+        None => number(text),
+    }
+}
+
 /// A relative error: a part, or per cent with a `%`.
 pub fn error(text: &str) -> Result<f64, String> {
-    let value = match text.strip_suffix('%') {
-        Some(percent) => number(percent)? / 100.0,
-        None => number(text)?,
-    };
+    let value = part(text)?;
     if ErrorTarget::RANGE.contains(&value) {
         Ok(value)
     } else {
@@ -270,17 +276,26 @@ pub fn error(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A weight greater than zero.
+/// A just-noticeable difference: a part of the force greater than zero.
 pub fn jnd(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
+    let value = part(text)?;
     if value > 0.0 {
         Ok(value)
     } else {
         Err(format!(
             "invalid just-noticeable difference {value}: expected a part of the force greater than \
-             0, like 0.07"
+             0, like 7% or 0.07"
         ))
     }
+}
+
+/// The same, or `by-force`.
+pub fn jnd_or_by_force(text: &str) -> Result<Jnd, String> {
+    if text == Jnd::BY_FORCE {
+        return Ok(Jnd::ByForce);
+    }
+    let or = |wrong: String| format!("{wrong}, or {}", Jnd::BY_FORCE);
+    jnd(text).map(Jnd::Part).map_err(or)
 }
 
 /// A force constant, N/m.

@@ -75,7 +75,7 @@ mod wiring;
 pub mod worst;
 
 pub use allocation::{Allocation, Allocator, AllocatorError, Reach};
-pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant};
+pub use fluxform_base::force_constant::{Criterion, ForceConstants, Jnd, NamedConstant};
 pub use given::{GivenForce, lowest_requested_m};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};

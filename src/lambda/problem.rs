@@ -198,6 +198,17 @@ impl ForceProblem<'_> {
         self.upper_a.len()
     }
 
+    /// Root mean square of the heights, m, each point with its weight.
+    #[must_use]
+    pub fn rms_height_m(&self) -> f64 {
+        let weight = |row: usize| self.weights.map_or(1.0, |weights| weights[row]);
+        let heights = self.height_m.iter().enumerate();
+        let (sum, total) = heights.fold((0.0, 0.0), |(sum, total), (row, height_m)| {
+            (sum + weight(row) * height_m * height_m, total + weight(row))
+        });
+        (sum / total).sqrt()
+    }
+
     /// The largest weight; 1 without weights.
     pub(super) fn heaviest(&self) -> f64 {
         let weights = self.weights.unwrap_or(&[1.0]);

@@ -418,6 +418,44 @@ fn a_sum_that_binds_has_a_saturation_that_verifies() {
     place.run(&["verify", folder]).ends(0);
 }
 
+/// By the requested force: that of small forces where it is small, that of large ones for a far stronger magnet.
+#[test]
+fn the_just_noticeable_difference_follows_the_force() {
+    let place = Place::new();
+    let text = String::from_utf8(place.read(AIR)).unwrap();
+    let strong = text.replace("magnetization_a_per_m = ", "magnetization_a_per_m = 100");
+    assert_ne!(text, strong);
+    place.write("strong.toml", &strong);
+    let run = |design: &str, jnd: &str| {
+        let args = ["lambda", design, WEDGE, "--format", "json", "--jnd", jnd];
+        let out = place.run(&args).ends(0).out;
+        serde_json::from_str::<serde_json::Value>(&out).unwrap()
+    };
+    for (design, part) in [(AIR, 0.15), ("strong.toml", 0.07)] {
+        let by_force = run(design, "by-force");
+        assert_eq!(by_force["jnd"], part, "{design}");
+        let percent = format!("{}%", 100.0 * part);
+        let given = run(design, &percent);
+        assert_eq!(by_force["lambda_n_per_m"], given["lambda_n_per_m"]);
+        assert_eq!(
+            given["lambda_n_per_m"],
+            run(design, &part.to_string())["lambda_n_per_m"]
+        );
+    }
+    let args = ["lambda", AIR, WEDGE, "--jnd", "by-force"];
+    let said = place.run(&args).ends(0).out;
+    assert!(said.contains("jnd at 15 %, found below 0.5 N"), "{said}");
+    place
+        .run(&["calibrate", AIR, WEDGE, "--jnd", "by-force"])
+        .ends(0);
+    place.run(&["verify", "results/seed_air/wedge"]).ends(0);
+    let other = ["calibrate", AIR, WEDGE, "--jnd", "15%"];
+    place
+        .run(&other)
+        .ends(4)
+        .says(&["made with other options", "jnd_by_force"]);
+}
+
 /// The just-noticeable difference of forces of newtons was silently taken for tens of millinewtons.
 #[test]
 fn the_range_of_the_just_noticeable_difference_is_said() {

@@ -31,6 +31,8 @@ pub fn made_with(request: &BenchRequest) -> Options {
     struct Recorded {
         criterion: Criterion,
         jnd: f64,
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        jnd_by_force: bool,
         tolerance: Option<f64>,
         #[serde(skip_serializing_if = "Option::is_none")]
         weights: Option<Weights>,
@@ -62,6 +64,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
         force: _,
         direction_jnd_deg: _,
         uncertainty: _,
+        jnd_by_force,
         // A scene's grids are measured as they are.
         default_error: _,
     } = lambda;
@@ -75,6 +78,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
     Options::of(&Recorded {
         criterion,
         jnd: jnd_weight,
+        jnd_by_force: *jnd_by_force,
         tolerance: *tolerance,
         weights: *weights,
         max_deviation_m: *max_deviation_m,

@@ -138,6 +138,7 @@ impl CalibrateOptions {
         } = self;
         let LambdaOptions {
             settings,
+            jnd_by_force,
             tolerance,
             weights,
             error,
@@ -161,7 +162,8 @@ impl CalibrateOptions {
         let requested = error.filter(|target| !target.by_default);
         let mut made_with = MadeWith {
             criterion: Some(criterion),
-            jnd: Some(jnd_weight),
+            jnd: Some(jnd_weight).filter(|_| !jnd_by_force),
+            jnd_by_force: *jnd_by_force,
             at_n_per_m,
             tolerance: *tolerance,
             force_direction: force.direction,

@@ -22,8 +22,9 @@ use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
-use crate::lambda::{Criterion, Settings, Wiring};
+use crate::lambda::{Criterion, Jnd, Settings, Wiring};
 use crate::scene::tolerances::ErrorTarget;
+use crate::units::FORCE_JND;
 
 /// The largest force constant of one object, and its currents
 ///
@@ -131,10 +132,11 @@ pub struct CriterionFlags {
     #[arg(long, value_name = "NAME", default_value = Criterion::default().name(),
           value_parser = values::named::<Criterion>())]
     criterion: Criterion,
-    /// Just-noticeable difference: the error that saturation may add, relative to the rms force
-    #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = crate::units::FORCE_JND,
-          value_parser = values::jnd, allow_hyphen_values = true)]
-    jnd: f64,
+    /// Just-noticeable difference: the error that saturation may add, relative to the rms force, like 7%;
+    /// by-force: 7% as measured at 2.5 to 10 N, or 15% for less than 0.5 N, where 15 to 27% are found
+    #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = Jnd::default(),
+          value_parser = values::jnd_or_by_force, allow_hyphen_values = true)]
+    jnd: Jnd,
     /// Angle between forces that a finger just notices, like 25deg: how static currents for a force vector
     /// weigh sideways errors [default: the shape file's `direction_jnd_deg`, or 25]
     #[arg(long, hide_short_help = true, value_name = "ANGLE", value_parser = values::direction_jnd,
@@ -153,9 +155,13 @@ impl CriterionFlags {
         LambdaOptions {
             settings: Settings {
                 criterion: self.criterion,
-                jnd_weight: self.jnd,
+                jnd_weight: match self.jnd {
+                    Jnd::Part(part) => part,
+                    Jnd::ByForce => FORCE_JND,
+                },
                 at_n_per_m: self.at,
             },
+            jnd_by_force: self.jnd == Jnd::ByForce,
             tolerance,
             direction_jnd_deg: self.direction_jnd,
             ..LambdaOptions::default()

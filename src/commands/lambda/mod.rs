@@ -18,6 +18,8 @@ mod variants;
 mod warnings;
 mod working_point;
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
@@ -37,7 +39,7 @@ use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
 use crate::force_direction::{ForceOverride, RequestedForce};
 use crate::lambda::worst::worst_point;
-use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
+use crate::lambda::{self, ForceProblem, Jnd, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
 use crate::point_weights::Weights;
 use crate::progress::Progress;
@@ -51,6 +53,7 @@ use crate::scene::steel;
 use crate::scene::steel::Solved;
 use crate::shape::document::ShapeDocument;
 use crate::uncertainty::UncertaintyOverride;
+use crate::units::FAINT_FORCE_N;
 
 /// Forces change over about the height above the coils: so many patches resolve them.
 const PATCHES_A_HEIGHT: f64 = 16.0;
@@ -60,6 +63,8 @@ const PATCHES_A_HEIGHT: f64 = 16.0;
 pub struct LambdaOptions {
     /// Criterion, its weight, and a force constant of interest.
     pub settings: Settings,
+    /// Whether the just-noticeable difference is [`Jnd::FAINT`] where the requested force is that small.
+    pub jnd_by_force: bool,
     /// Tolerance of the forces; `None` for the default.
     pub tolerance: Option<f64>,
     /// How the points of a grid count; `None`: as their shape's document says.
@@ -117,6 +122,26 @@ pub struct LambdaReport {
 }
 
 impl LambdaOptions {
+    /// These options with the just-noticeable difference of the force that `problem` requests: the rms force of the
+    /// chosen constant. Where it is faint at one and not at the other, the one of larger forces holds.
+    fn with_jnd_of(&self, problem: &ForceProblem) -> Result<Cow<'_, Self>, RunError> {
+        if !self.jnd_by_force {
+            return Ok(Cow::Borrowed(self));
+        }
+        let faint = Settings {
+            jnd_weight: Jnd::FAINT,
+            ..self.settings
+        };
+        let constant = lambda::constant(problem, &faint)?;
+        if constant.is_none_or(|n_per_m| n_per_m * problem.rms_height_m() >= FAINT_FORCE_N) {
+            return Ok(Cow::Borrowed(self));
+        }
+        Ok(Cow::Owned(Self {
+            settings: faint,
+            ..self.clone()
+        }))
+    }
+
     /// These options with the error that holds for `document`.
     #[must_use]
     pub fn for_document(&self, document: &ShapeDocument) -> Self {
@@ -410,17 +435,19 @@ pub(crate) fn solve_at(
         resistance_ohm: &resistance_ohm,
     };
     let rewired = (!options.wiring.is_plain()).then(|| options.wiring.apply(&unwired));
+    let problem = rewired
+        .as_ref()
+        .map_or(unwired, |rewired| rewired.problem(&unwired));
+    let options = options.with_jnd_of(&problem)?;
     let posed = PosedProblem {
         scene,
         solved,
         field,
         points,
-        options,
+        options: options.as_ref(),
         unwired,
         force: options.force.over(RequestedForce::default()),
-        problem: rewired
-            .as_ref()
-            .map_or(unwired, |rewired| rewired.problem(&unwired)),
+        problem,
     };
     let pull = pull.filter(|_| counts).map(|pull| passive::accuracy(&pull));
     let mut report = posed.report(passive_n.as_deref(), pull, progress)?;

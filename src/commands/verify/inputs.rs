@@ -20,6 +20,7 @@ use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
 use crate::shape::bodies::BodyOptions;
 use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource};
+use crate::units::FORCE_JND;
 
 /// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
 const INPUTS_MAX: usize = 16;
@@ -139,15 +140,17 @@ impl Sources {
 /// The options of the run that made the bundle; faults where they are none.
 pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
     let stored = &bundle.lambda;
+    let made_with = bundle.manifest.made_with.as_ref();
+    let jnd_by_force = made_with.is_some_and(|made| made.jnd_by_force);
     let settings = Settings {
         criterion: stored.criterion,
-        jnd_weight: stored.jnd,
+        jnd_weight: if jnd_by_force { FORCE_JND } else { stored.jnd },
         at_n_per_m: stored.at.as_ref().map(|at| at.lambda_n_per_m),
     };
-    let made_with = bundle.manifest.made_with.as_ref();
     let mut options = CalibrateOptions::new("");
     options.lambda = LambdaOptions {
         settings,
+        jnd_by_force,
         tolerance: made_with.and_then(|made| made.tolerance),
         weights: made_with.and_then(|made| made.weights),
         error: made_with.and_then(|made| {
@@ -180,8 +183,8 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
     }
     let sound = options.reach_m >= 0.0
         && options.reach_m.is_finite()
-        && settings.jnd_weight > 0.0
-        && settings.jnd_weight.is_finite()
+        && stored.jnd > 0.0
+        && stored.jnd.is_finite()
         && settings
             .at_n_per_m
             .is_none_or(|at| at >= 0.0 && at.is_finite())
