@@ -9,8 +9,8 @@ use serde_json::Value;
 
 fn main() -> ExitCode {
     needs::run(trials! {
-        None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_agrees_with_the_files, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages],
-        no_browser() => [a_browser_draws_the_page_and_answers, a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep],
+        None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_agrees_with_the_files, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages, a_replay_is_watched_on_a_page],
+        no_browser() => [a_browser_draws_the_page_and_answers, a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep, a_browser_moves_the_finger_of_a_replay],
     })
 }
 
@@ -278,6 +278,81 @@ fn optimize_and_sweep_write_pages() {
     for reported in ["12 of 12 designs", "wire.diameter_mm", "draw-front-2"] {
         assert!(html.contains(reported), "{reported}");
     }
+}
+
+/// A replay of one finger, and of two, with their pages.
+fn replayed() -> Place {
+    let place = Place::new();
+    run(&place, &["calibrate", DESIGN, "shapes/wedge.toml"], 0);
+    let bundle = "results/seed_air/wedge";
+    let one = [
+        "replay",
+        bundle,
+        "--synthesize",
+        "explore",
+        "--duration",
+        "40",
+        "--report",
+        "one.html",
+    ];
+    run(&place, &one, 0);
+    let rows = (0..40).map(|k| {
+        let t = 0.02 * f64::from(k);
+        format!("{t},-0.03,{},0.05,0.03,{},0.06\n", 0.02 * t, -0.03 * t)
+    });
+    let head = "t_s,x_m,y_m,z_m,x2_m,y2_m,z2_m\n".to_owned();
+    place.write("two.csv", &rows.fold(head, |table, row| table + &row));
+    let two = [
+        "replay",
+        bundle,
+        "two.csv",
+        "--report",
+        "two.html",
+        "--out",
+        "two_fingers.csv",
+    ];
+    run(&place, &two, 0);
+    place
+}
+
+fn a_replay_is_watched_on_a_page() {
+    let place = replayed();
+    let pages = ["one.html", "two.html"].map(|name| place.text(name));
+    for html in &pages {
+        is_a_page(html);
+        for reported in [
+            "<h1>wedge on seed_air</h1>",
+            "id=\"draw-replay\"",
+            "with fixed currents",
+        ] {
+            assert!(html.contains(reported), "{reported}");
+        }
+    }
+    // Of 2,001 positions at most 1,000 are moved to; the drawing of all of them is there without a script.
+    assert!(pages[0].contains("one in 3 is shown") && !pages[1].contains("is shown"));
+    assert!(pages.iter().all(|html| html.contains("seen from above")));
+    let facts: Value = serde_json::from_str(&place.text("replay.json")).unwrap();
+    let relative = facts["force"]["static"]["relative_rms_error"]
+        .as_f64()
+        .unwrap();
+    let digits = format!("{:.1}", 100.0 * relative);
+    assert!(pages[0].contains(&digits), "{digits}");
+    let both = [
+        "replay",
+        "results/seed_air/wedge",
+        "two.csv",
+        "--report",
+        "-",
+        "--out",
+        "-",
+    ];
+    run(&place, &both, 2);
+}
+
+fn a_browser_moves_the_finger_of_a_replay() {
+    let place = replayed();
+    in_a_browser(&place.path("one.html"));
+    in_a_browser(&place.path("two.html"));
 }
 
 /// Output of the script that drives a browser.

@@ -104,7 +104,7 @@ pub const COMMANDS: &[Writes] = &[
         spoils: "finger.csv",
         ..writes(
             "replay",
-            "replay bundles/air/bump finger.csv --out out/replay.csv --plot out/replay.svg",
+            "replay bundles/air/bump finger.csv --out out/replay.csv --plot out/replay.svg --report out/replay.html",
         )
     },
     Writes {

@@ -206,7 +206,7 @@ fn a_bundle_that_is_not_whole_or_has_no_force_constant_is_refused() {
         .says(&["2.0.0 is newer than this program"]);
     replay(&place, "nowhere --synthesize scan")
         .ends(3)
-        .says(&["is not a bundle"]);
+        .says(&["nowhere: no such folder"]);
 
     // A flat surface that attraction cannot push up.
     let place = with_a_bundle();

@@ -229,6 +229,8 @@ def check(page):
         turns(browser, expect)
     if browser.value("!!document.querySelector('#draw-field')"):
         slides(browser, expect)
+    if browser.value("!!document.querySelector('#draw-replay')"):
+        watches(browser, expect)
     order = browser.value("[...document.querySelectorAll('h1,h2,h3')].map((h) => Number(h.tagName[1]))")
     steps = all(b <= a + 1 for a, b in zip(order, order[1:]))
     expect("headings go down one level at a time", order[:1] == [1] and steps)
@@ -290,6 +292,30 @@ def slides(browser, expect):
     )
     browser.mouse("mouseMoved", *browser.middle("#draw-field canvas"))
     expect("a coil alone is reported per ampere", "mT/m/A" in browser.tip())
+
+
+def watches(browser, expect):
+    moved = "document.querySelector('#draw-replay').innerHTML"
+    at = "Number(document.querySelector('#draw-replay input').value)"
+    before, said = browser.value(moved), browser.value("document.querySelector('#draw-replay p').textContent")
+    browser.value("document.querySelector('#draw-replay input').focus()")
+    for _ in range(5):
+        browser.key("ArrowRight")
+    browser.settle()
+    expect("the slider moves the finger", browser.value(at) == 5 and browser.value(moved) != before)
+    now = browser.value("document.querySelector('#draw-replay p').textContent")
+    expect("the forces of that moment are reported", "mN" in now and now != said)
+    click = "document.querySelector('#draw-replay button').click()"
+    browser.value(click)
+    for _ in range(100):
+        browser.settle()
+        if browser.value(at) > 5:
+            break
+    expect("the button plays it", browser.value(at) > 5)
+    browser.value(click)
+    stopped = browser.value(at)
+    browser.settle()
+    expect("and stops it", browser.value(at) == stopped)
 
 
 def shot(page, folder):

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::output::{ReplayFiles, write_trajectory};
+use super::page;
 use super::summary::TrajectorySource;
 use super::synthesize;
 use super::synthesize::{Kind, Synthesis};
@@ -17,8 +18,8 @@ use crate::bundle::trajectory::Trajectory;
 use crate::cli::args::Writing;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
-use crate::cli::help::{Codes, page};
-use crate::cli::pictures::{Picture, table_or_drawing};
+use crate::cli::help::{self, Codes};
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
@@ -37,12 +38,13 @@ const MOST_POSITIONS: f64 = 1e8;
 /// beyond the limits (saturated) or outside the map. A position is held until the next one; with
 /// --dynamics its row states the end of that time.
 #[derive(Debug, Args)]
-#[command(after_long_help = page(Codes::Writing, &[
+#[command(after_long_help = help::page(Codes::Writing, &[
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
     ("fluxform replay results/seed_air/flat --synthesize explore --trajectory-out finger.csv",
      "an exploring finger made up"),
     ("fluxform replay results/seed_air/flat finger.csv --out felt.csv --plot felt.svg",
      "replay a recorded trajectory, with a picture"),
+    ("fluxform replay results/seed_air/flat finger.csv --report felt.html --force", "a page to watch it"),
     ("fluxform replay results/seed_air/flat finger.csv --dynamics --out - -q",
      "let the currents lag as the coils' circuit does; the table to standard output"),
 ]))]
@@ -91,6 +93,11 @@ pub struct Replay {
     /// Draw finger, forces and currents over time to this file (.svg, .png or .pdf)
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
+    /// Write a page to watch it here (HTML); `-` is standard output
+    ///
+    /// A slider or a button moves the finger; forces and currents of that moment are beside it.
+    #[arg(long, value_name = "FILE")]
+    report: Option<FileArgument>,
     /// Where the table goes; `-` is standard output
     ///
     /// Its facts and seconds go beside it (replay.json, timing_replay.json); with `-` they are not
@@ -126,7 +133,12 @@ impl Replay {
             FileArgument::Standard => None,
             FileArgument::Path(path) => Some(ReplayFiles::new(path)?),
         };
-        table_or_drawing(&self.out, self.plot.as_ref())?;
+        let drawn = [self.plot.as_ref(), self.report.as_ref()];
+        let streams = drawn.into_iter().flatten().chain([&self.out]);
+        if streams.filter(|file| file.is_standard()).count() > 1 {
+            let wrong = "only one of --out, --plot and --report can go to standard output (-)";
+            return Err(Failure::Usage(wrong.to_owned()));
+        }
         let opened = Opened::new(&self.bundle)?;
         let opened = if self.robust {
             opened.robust()?
@@ -148,12 +160,13 @@ impl Replay {
             let overwrite = Overwrite::same_bytes(force, &inputs).protecting(protected.iter());
             write_trajectory(&trajectory, path, &overwrite)?;
         }
-        let plot = self.plot.as_ref().map(|file| {
-            let written = self.trajectory_out.clone();
-            Picture::new(file, force, protected.into_iter().chain(written))
+        let [plot, page] = drawn.map(|file| {
+            let written = self.trajectory_out.iter();
+            let protected = protected.iter().chain(written).cloned();
+            file.map(|file| Picture::new(file, force, protected))
         });
-        if let Some(plot) = &plot {
-            plot.check(&inputs)?;
+        for picture in [&plot, &page].into_iter().flatten() {
+            picture.check(&inputs)?;
         }
         let bar = begin(printer);
         let mut report = run(&opened, &trajectory, source, self.dynamics, &bar)?;
@@ -161,10 +174,16 @@ impl Replay {
         for warning in &report.summary.warnings {
             printer.warning(warning);
         }
-        let drawn = match &plot {
+        let mut drawn = match &plot {
             Some(plot) => plot.draw(&inputs, &report.drawing(), printer)?,
             None => Stream::Output,
         };
+        if let Some(page) = &page {
+            let written = page.write(&inputs, &page::html(&report, &opened.below()), printer)?;
+            if written == Stream::Error {
+                drawn = written;
+            }
+        }
         let place = match (&files, &overwrite) {
             (Some(files), Some(overwrite)) => {
                 report.write(files, overwrite)?;
@@ -238,11 +257,12 @@ impl Replay {
 
     /// The files beside the table's own.
     fn beside(&self) -> impl Iterator<Item = &PathBuf> {
-        let plot = self.plot.as_ref().and_then(|file| match file {
+        let drawn = [self.plot.as_ref(), self.report.as_ref()];
+        let drawn = drawn.into_iter().flatten().filter_map(|file| match file {
             FileArgument::Path(path) => Some(path),
             FileArgument::Standard => None,
         });
-        self.trajectory_out.iter().chain(plot)
+        self.trajectory_out.iter().chain(drawn)
     }
 
     /// The requested synthesis, and its name for people.

@@ -7,6 +7,7 @@
 pub(crate) mod command;
 mod felt;
 pub mod output;
+pub(crate) mod page;
 mod plausible;
 pub mod renderer;
 pub mod summary;
@@ -27,10 +28,13 @@ use crate::numerics::vec3::dot;
 use crate::progress::Progress;
 use crate::scene::moment_a_m2;
 use felt::Felt;
+use page::Below;
 use renderer::{Renderer, RendererError, Step};
 use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
 use synthesize::Synthesis;
 
+/// Of a lone coil in the drawing of a bundle that holds no design.
+const UNKNOWN_RADIUS_M: f64 = 0.01;
 /// Positions between two looks at the interruption flag.
 const PORTION: usize = 4096;
 
@@ -124,6 +128,25 @@ impl Opened {
     #[must_use]
     pub fn synthesize(&self, synthesis: &Synthesis) -> Trajectory {
         synthesis.trajectory(self.renderer.heights(), self.renderer.map())
+    }
+
+    /// The array, as far as the bundle tells.
+    fn below(&self) -> Below<'_> {
+        let positions_m = &self.bundle.manifest.array.positions_m[..];
+        let design = Design::read(&self.bundle.folder.join(DESIGN_FILE), Need::SWEEP);
+        let apart = |[a, b]: [&[f64; 2]; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let halves = positions_m.iter().flat_map(|a| {
+            let others = positions_m.iter().filter(move |b| *b != a);
+            others.map(move |b| 0.5 * apart([a, b]))
+        });
+        let known = design
+            .ok()
+            .and_then(|(design, _)| Some(0.5 * design.coil?.outer_diameter_m));
+        Below {
+            positions_m,
+            outer_radius_m: known
+                .unwrap_or_else(|| halves.reduce(f64::min).unwrap_or(UNKNOWN_RADIUS_M)),
+        }
     }
 
     /// Bandwidth of the current loop that the bundle's design has, Hz.

@@ -46,6 +46,13 @@ impl Drawing {
         renumbered(&SvgBackend::default().render_scene(&self.0))
     }
 
+    /// As SVG that takes the size of the place that it stands in.
+    #[must_use]
+    pub fn markup(&self) -> String {
+        let scales = format!("<svg viewBox=\"0 0 {} {}\" ", self.0.width, self.0.height);
+        self.svg().replacen("<svg ", &scales, 1)
+    }
+
     /// In `format`.
     ///
     /// # Errors

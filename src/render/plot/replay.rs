@@ -110,7 +110,7 @@ impl ReplayPlot<'_> {
     fn plan(&self) -> (Vec<Plot>, Layout) {
         let mut plots = Vec::new();
         for (finger, colour) in self.coloured() {
-            let every = finger.position_m.len().div_ceil(4 * PARTS).max(1);
+            let every = finger.position_m.len().div_ceil(2 * PARTS).max(1);
             for (inside, colour) in [(true, colour), (false, FIXED)] {
                 let rows = finger.position_m.iter().zip(&finger.inside);
                 let points = rows.filter(|(_, is)| **is == inside).step_by(every);

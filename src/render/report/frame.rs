@@ -8,12 +8,13 @@ use super::pack::{base64, in_script};
 
 const STYLE: &str = include_str!("assets/style.css");
 /// Read in this order; one script, so that names are shared.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("assets/base.js"),
     include_str!("assets/chart.js"),
     include_str!("assets/heat.js"),
     include_str!("assets/scene.js"),
     include_str!("assets/turn.js"),
+    include_str!("assets/replay.js"),
     include_str!("assets/page.js"),
 ];
 

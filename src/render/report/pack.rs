@@ -26,7 +26,7 @@ pub fn base64(bytes: &[u8]) -> String {
 
 /// Numbers as 32-bit floats, little-endian; what is missing is not a number there.
 #[must_use]
-pub(crate) fn f32s(values: impl IntoIterator<Item = f64>) -> Value {
+pub fn f32s(values: impl IntoIterator<Item = f64>) -> Value {
     let bytes: Vec<u8> = values
         .into_iter()
         .flat_map(|value| (value as f32).to_le_bytes())
@@ -36,7 +36,7 @@ pub(crate) fn f32s(values: impl IntoIterator<Item = f64>) -> Value {
 
 /// Numbers as 16-bit steps between their least and their largest: within 1/131070 of that range.
 #[must_use]
-pub(crate) fn u16s(values: &[f64]) -> Value {
+pub fn u16s(values: &[f64]) -> Value {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };

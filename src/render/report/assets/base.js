@@ -57,6 +57,11 @@ function add(parent, name, attributes = {}, text) {
   return element;
 }
 
+// A text along an axis, turned by so many degrees.
+function turned(svg, x, y, angle, text) {
+  add(svg, "text", { transform: `translate(${x},${y}) rotate(${angle})`, "text-anchor": "middle" }, text);
+}
+
 const tip = document.getElementById("tip");
 const spoken = document.getElementById("say");
 

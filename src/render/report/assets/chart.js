@@ -103,10 +103,6 @@ function chart(place, spec) {
     return hi > lo ? [lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)] : [lo - 0.5, hi + 0.5];
   }
 
-  function turned(svg, x, y, angle, text) {
-    add(svg, "text", { transform: `translate(${x},${y}) rotate(${angle})`, "text-anchor": "middle" }, text);
-  }
-
   function legend() {
     const list = add(place, "ul", { class: "legend" });
     for (const one of spec.series) {

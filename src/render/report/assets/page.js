@@ -50,6 +50,7 @@ function around([from, to], count) {
 }
 
 own("turn", turn);
+own("replay", replay);
 
 own("errors", (place) => {
   const s = data.surface;
