@@ -175,6 +175,13 @@ pub fn slowest_inductance_h(matrix_h: &[Vec<f64>]) -> f64 {
     matrix.symmetric_eigenvalues().max()
 }
 
+/// The largest inductance of a coil among the others, H: the largest entry of the diagonal.
+#[must_use]
+pub fn largest_self_inductance_h(matrix_h: &[Vec<f64>]) -> f64 {
+    let own = matrix_h.iter().enumerate().map(|(i, row)| row[i]);
+    own.fold(0.0, f64::max)
+}
+
 fn matrix_of(
     self_h: f64,
     axes_m: &[[f64; 2]],

@@ -12,6 +12,7 @@ use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck};
+use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 
 /// One coil alone at its rated current, SI.
 pub(crate) struct Rated {
@@ -115,19 +116,21 @@ impl Rated {
             warnings: single.warnings,
         };
         // A coil alone is its own array.
-        let alone = (scene.coils.len() == 1).then_some(circuit.inductance_h);
-        rated.check_limits(scene, alone);
+        let alone = [vec![circuit.inductance_h]];
+        rated.check_limits(scene, (scene.coils.len() == 1).then_some(&alone));
         Ok(rated)
     }
 
-    /// Checks the design's limits; `array_inductance_h` is that of the array's slowest pattern
-    /// of currents, where that is known.
-    pub(crate) fn check_limits(&mut self, scene: &Scene, array_inductance_h: Option<f64>) {
+    /// Checks the design's limits; `inductances_h` is the array's matrix, where that is known. With a plate or
+    /// other bodies of steel a coil's inductance is that among them.
+    pub(crate) fn check_limits(&mut self, scene: &Scene, inductances_h: Option<&[Vec<f64>]>) {
         let summary = &self.coil.circuit;
+        let among_steel = inductances_h.filter(|_| scene.design.has_iron());
+        let array_inductance_h = inductances_h.map(slowest_inductance_h);
         self.limits = limits::check(&Evaluated {
             design: scene.design,
             circuit: &Circuit {
-                inductance_h: summary.inductance_h,
+                inductance_h: among_steel.map_or(summary.inductance_h, largest_self_inductance_h),
                 ..scene.circuit
             },
             power_w: summary.power_w,

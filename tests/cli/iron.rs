@@ -54,6 +54,36 @@ fn norm(field: [f64; 3]) -> f64 {
     field.iter().map(|b| b * b).sum::<f64>().sqrt()
 }
 
+/// The limit stood at the coil's own time, without the plate that it stands on.
+#[test]
+fn a_plate_counts_in_the_settling_limit_of_a_coil() {
+    let place = Place::new();
+    let limits = |more: &str| {
+        let evaluation = evaluated(&place, &format!("{more}[limits]\nsettling_max_ms = 1e6\n"));
+        let limit = evaluation["limits"]["settling_s"]["value"]
+            .as_f64()
+            .unwrap();
+        let coils = evaluation["array"]["mutual_inductance_h"]
+            .as_array()
+            .unwrap();
+        let own = (0..coils.len()).map(|i| coils[i][i].as_f64().unwrap());
+        let resistance_ohm = evaluation["coil"]["resistance_ohm"].as_f64().unwrap();
+        let own_s = 5.0 * own.fold(0.0, f64::max) / resistance_ohm;
+        (
+            limit,
+            own_s,
+            evaluation["coil"]["settling_s"].as_f64().unwrap(),
+        )
+    };
+    let (limit, _, alone) = limits(CORE);
+    assert_eq!(limit, alone);
+    let (limit, own, alone) = limits(PLATE);
+    assert!(
+        (limit / own - 1.0).abs() < 1e-12 && limit > 1.1 * alone,
+        "{limit} {own} {alone}"
+    );
+}
+
 #[test]
 fn a_plate_joins_the_cores_and_one_far_below_does_nothing() {
     let place = Place::new();

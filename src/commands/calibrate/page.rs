@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::recorded;
 use crate::bundle::write::BundleContent;
 use crate::coil::limits::{self, Evaluated, LimitCheck};
-use crate::coil::mutual::slowest_inductance_h;
+use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
 use crate::scene::Scene;
@@ -51,8 +51,7 @@ fn limit_checks(
     let mut circuit = scene.circuit;
     let mut array_inductance_h = circuit.inductance_h;
     if let Some(array) = &content.manifest.circuit {
-        let own = array.inductance_h.iter().enumerate().map(|(i, row)| row[i]);
-        circuit.inductance_h = own.fold(0.0, f64::max);
+        circuit.inductance_h = largest_self_inductance_h(&array.inductance_h);
         array_inductance_h = slowest_inductance_h(&array.inductance_h);
     }
     let steel_kg = scene

@@ -110,7 +110,7 @@ pub fn evaluate(
     let mut rated = Rated::new(&scene)?;
     let array = neighbours::array(&scene, &mut rated.accuracy, &mut rated.warnings)?;
     if let Some(array) = &array {
-        rated.check_limits(&scene, Some(array.slowest_inductance_h));
+        rated.check_limits(&scene, Some(&array.mutual_inductance_h));
     }
     let of_array = array.iter().flat_map(|array| &array.accuracy_missed);
     rated.accuracy_missed.extend(of_array.cloned());

@@ -10,7 +10,7 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::coil::array_search::problem::{Level, Physical, Physics};
-use crate::coil::mutual::slowest_inductance_h;
+use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::commands::discretize;
 use crate::commands::lambda::WantedPoints;
 use crate::commands::lambda::placement::Placed;
@@ -261,7 +261,11 @@ impl<'a> ArrayPhysics<'a> {
         let (matrix, _) = neighbours::inductances(&solved, in_air);
         Ok(Some(Physical {
             lambda_n_per_m,
-            inductance_h,
+            inductance_h: if design.has_iron() {
+                largest_self_inductance_h(&matrix)
+            } else {
+                inductance_h
+            },
             array_inductance_h: slowest_inductance_h(&matrix),
             core_field_t,
         }))
