@@ -29,7 +29,7 @@ fn unmaintained_packages_come_with_the_named_ones_alone() {
             .collect();
         assert_eq!(
             found, bringers,
-            "{name}: mend this table, .deny.toml and src/DESIGN.md"
+            "{name}: mend this table, .deny.toml and src/DEPENDENCIES.md"
         );
         let listed: Vec<String> = bringers.iter().map(|it| format!("\"{it}\"")).collect();
         let line = format!(
@@ -46,5 +46,5 @@ fn unmaintained_packages_come_with_the_named_ones_alone() {
 #[test]
 fn the_number_of_packages_is_stated() {
     let stated = format!("`Cargo.lock` names {} packages", packages().len());
-    assert!(read("src/DESIGN.md").contains(&stated), "{stated}");
+    assert!(read("src/DEPENDENCIES.md").contains(&stated), "{stated}");
 }
