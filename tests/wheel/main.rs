@@ -14,6 +14,7 @@ fn main() -> ExitCode {
     needs::run(trials! {
         missing() => [
             the_program_is_in_the_wheel,
+            the_source_distribution_holds_what_a_build_needs,
             the_module_gives_the_numbers_of_the_command,
             a_bundle_gives_the_currents_of_the_loader_that_works_alone,
             documents_in_memory_are_files_to_every_command,
@@ -92,6 +93,45 @@ fn the_program_is_in_the_wheel() {
         .args(["evaluate", "none.toml"])
         .output();
     assert_eq!(ran.unwrap().status.code(), Some(3));
+}
+
+/// Where there is no wheel pip builds from sources: their manifests and every file that is compiled in.
+fn the_source_distribution_holds_what_a_build_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let in_folder = |program: &str| {
+        let mut command = Command::new(program);
+        command.current_dir(folder.path());
+        command
+    };
+    run(in_folder("maturin")
+        .args(["sdist", "--out", "made", "--manifest-path"])
+        .arg(root().join("src/python/Cargo.toml")));
+    let version = env!("CARGO_PKG_VERSION");
+    let archive = format!("made/fluxform-{version}.tar.gz");
+    run(in_folder("python3").args(["-m", "tarfile", "-e", &archive, "unpacked"]));
+    let tree = format!("unpacked/fluxform-{version}");
+    run(in_folder("cargo")
+        .args(["metadata", "--locked", "--offline", "--format-version", "1"])
+        .args(["--manifest-path", &format!("{tree}/src/python/Cargo.toml")]));
+    let is_compiled_in = |line: &str| {
+        let (_, rest) = line.split_once("include_str!(\"")?;
+        Some(rest.split_once('"')?.0.to_owned())
+    };
+    let compiling_in = [
+        "src/render/report/frame.rs",
+        "src/bundle/schema.rs",
+        "src/cli/code.rs",
+        "src/shape/step/kernel.rs",
+    ];
+    for source in compiling_in {
+        let text = std::fs::read_to_string(root().join(source)).unwrap();
+        assert!(text.lines().any(|line| is_compiled_in(line).is_some()));
+        let beside = Path::new(source).parent().unwrap();
+        for named in text.lines().filter_map(is_compiled_in) {
+            let file = folder.path().join(&tree).join(beside).join(&named);
+            assert!(file.is_file(), "{source}: {named} is not in the archive");
+        }
+    }
 }
 
 fn the_module_gives_the_numbers_of_the_command() {
