@@ -405,7 +405,12 @@ mod tests {
             ]
         );
         let error = read_positions("p.csv", "x_m,x_m,z\n".as_bytes()).unwrap_err();
-        assert_eq!(error.faults.len(), 3);
+        let header = "expected a header line with x_m,y_m,z_m, found \"x_m,x_m,z\"";
+        let missing = format!("p.csv:1: columns y_m, z_m are missing; {header}");
+        assert_eq!(
+            error.faults,
+            ["p.csv:1: column x_m appears twice", &missing]
+        );
         let many = format!("x_m,y_m,z_m\n{}", "a,b,c\n".repeat(50));
         let error = read_positions("p.csv", many.as_bytes()).unwrap_err();
         assert_eq!(error.faults.len(), 6);
