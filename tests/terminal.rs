@@ -80,7 +80,8 @@ fn interrupted_at(place: &Place, arguments: &[&str], shown: &str) -> (Option<i32
 /// After the last bar its line is emptied, and only then the end is reported.
 #[track_caller]
 fn assert_cleared(text: &str) {
-    let after = &text[text.rfind("[=").or(text.rfind("[>")).unwrap()..];
+    // Every bar states items a second.
+    let after = &text[text.rfind("/s").unwrap()..];
     let (cleared, said) = (after.rfind(CLEARED), after.rfind("interrupted"));
     assert!(cleared.is_some() && cleared < said, "{after:?}");
 }
