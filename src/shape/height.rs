@@ -190,11 +190,60 @@ const NOTHING: Hit = Hit {
     triangle: u32::MAX,
 };
 
+impl Hit {
+    fn sample(self, triangles: &[Triangle]) -> Option<Sample> {
+        (self.triangle != u32::MAX).then(|| Sample {
+            height_m: self.height,
+            normal: upward_normal(&triangles[self.triangle as usize]),
+        })
+    }
+}
+
 /// Facets that touch a point without covering it.
 #[derive(Clone, Copy)]
 struct Touch {
     hit: Hit,
     wall: bool,
+}
+
+impl Touch {
+    fn with(self, triangles: &[Triangle], other: Self) -> Self {
+        Self {
+            hit: higher(triangles, self.hit, other.hit),
+            wall: self.wall | other.wall,
+        }
+    }
+
+    /// What counts at a point: what covers it, unless nothing does or a wall is there.
+    fn or_covered(self, triangles: &[Triangle], covering: Hit) -> Hit {
+        if self.wall || covering.height == f64::NEG_INFINITY {
+            higher(triangles, covering, self.hit)
+        } else {
+            covering
+        }
+    }
+}
+
+/// What a contact is to a point.
+enum Meeting {
+    None,
+    Covers(Hit),
+    Touches(Touch),
+}
+
+fn meeting(triangle: u32, contact: Contact) -> Meeting {
+    let touches = |height, wall| {
+        Meeting::Touches(Touch {
+            hit: Hit { height, triangle },
+            wall,
+        })
+    };
+    match contact {
+        Contact::None => Meeting::None,
+        Contact::Covers(height) => Meeting::Covers(Hit { height, triangle }),
+        Contact::Near(height) => touches(height, false),
+        Contact::Wall(height) => touches(height, true),
+    }
 }
 
 /// The best hits of some of the triangles.
@@ -245,18 +294,12 @@ impl<'a> Layer<'a> {
     }
 
     fn meet(&mut self, point: usize, triangle: u32, contact: Contact) {
-        let touch = |height, wall| Touch {
-            hit: Hit { height, triangle },
-            wall,
-        };
-        match contact {
-            Contact::None => {}
-            Contact::Covers(height) => {
-                let hit = Hit { height, triangle };
+        match meeting(triangle, contact) {
+            Meeting::None => {}
+            Meeting::Covers(hit) => {
                 self.covering[point] = higher(self.triangles, self.covering[point], hit);
             }
-            Contact::Near(height) => self.touch(point, touch(height, false)),
-            Contact::Wall(height) => self.touch(point, touch(height, true)),
+            Meeting::Touches(touch) => self.touch(point, touch),
         }
     }
 
@@ -264,10 +307,7 @@ impl<'a> Layer<'a> {
         let triangles = self.triangles;
         self.touching
             .entry(point)
-            .and_modify(|old| {
-                old.hit = higher(triangles, old.hit, new.hit);
-                old.wall |= new.wall;
-            })
+            .and_modify(|old| *old = old.with(triangles, new))
             .or_insert(new);
     }
 
@@ -286,23 +326,18 @@ impl<'a> Layer<'a> {
         self
     }
 
-    /// Decides every point: what covers it, unless nothing does or a wall is there.
+    /// Decides every point.
     fn samples(mut self) -> Vec<Option<Sample>> {
         let triangles = self.triangles;
         for (point, touch) in &self.touching {
             let covering = &mut self.covering[*point];
-            if touch.wall || covering.height == f64::NEG_INFINITY {
-                *covering = higher(triangles, *covering, touch.hit);
-            }
+            *covering = touch.or_covered(triangles, *covering);
         }
         self.covering
             .par_iter()
             .map(|hit| {
                 fluxform_base::progress::poll();
-                (hit.triangle != u32::MAX).then(|| Sample {
-                    height_m: hit.height,
-                    normal: upward_normal(&triangles[hit.triangle as usize]),
-                })
+                hit.sample(triangles)
             })
             .collect()
     }
@@ -310,11 +345,18 @@ impl<'a> Layer<'a> {
 
 /// The surface over one point, from how the triangles touch its vertical line.
 pub(super) fn sample_of(triangles: &[Triangle], contacts: &[(u32, Contact)]) -> Option<Sample> {
-    let mut layer = Layer::new(triangles, 1);
+    let (mut covering, mut touching) = (NOTHING, None::<Touch>);
     for (triangle, contact) in contacts {
-        layer.meet(0, *triangle, *contact);
+        match meeting(*triangle, *contact) {
+            Meeting::None => {}
+            Meeting::Covers(hit) => covering = higher(triangles, covering, hit),
+            Meeting::Touches(new) => {
+                touching = Some(touching.map_or(new, |old| old.with(triangles, new)));
+            }
+        }
     }
-    layer.samples()[0]
+    let hit = touching.map_or(covering, |touch| touch.or_covered(triangles, covering));
+    hit.sample(triangles)
 }
 
 /// The higher hit. At equal heights the face seen from above is wanted: any face before a wall,

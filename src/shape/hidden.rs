@@ -12,6 +12,7 @@ use crate::index::Index;
 use crate::mesh::Mesh;
 use crate::point_flags::{self, Rules};
 use crate::surface::Surface;
+use crate::vertical_hit::may_touch;
 use fluxform_numerics::axis::Axis;
 use fluxform_numerics::vec3::{cross, dot, minus};
 
@@ -141,21 +142,13 @@ fn is_covered(
     };
     let above: Vec<u32> = touching.iter().copied().filter(rises).collect();
     above.iter().any(|at| *at as usize != facet)
-        && point_flags::at(triangles, &above, p, rules)
-            .is_some_and(|(top, _)| top.height_m > seen_m)
+        && point_flags::sample_at(triangles, &above, p, rules)
+            .is_some_and(|top| top.height_m > seen_m)
 }
 
 /// Whether any of `triangle` lies above `height_m` and within `reach_m` of the line through `p`.
 fn may_cover(triangle: &Triangle, p: [f64; 2], height_m: f64, reach_m: f64) -> bool {
-    let range = |k: usize| {
-        let [a, b, c] = triangle.map(|corner| corner[k]);
-        (a.min(b).min(c), a.max(b).max(c))
-    };
-    let meets = |k: usize| {
-        let (low, high) = range(k);
-        p[k] >= low - reach_m && p[k] <= high + reach_m
-    };
-    range(2).1 > height_m && meets(0) && meets(1)
+    triangle.iter().any(|corner| corner[2] > height_m) && may_touch(triangle, p, reach_m)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::file_mesh::Triangle;
 use crate::height::{Sample, sample_of};
-use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, may_touch, upward_normal};
 use fluxform_numerics::vec3::{dot, minus};
 
 /// Faces that turn by less are neighbours on a curved surface, degrees.
@@ -81,16 +81,39 @@ pub(super) fn at(
     p: [f64; 2],
     rules: Rules,
 ) -> Option<(Sample, Marks)> {
-    let mut contacts = Vec::with_capacity(touching.len());
+    let contacts = contacts(triangles, touching, p, rules);
+    let sample = sample_of(triangles, &contacts)?;
+    Some((sample, of_contacts(triangles, &contacts, p, &sample, rules)))
+}
+
+/// What [`at`] gives, without the marks.
+pub(super) fn sample_at(
+    triangles: &[Triangle],
+    touching: &[u32],
+    p: [f64; 2],
+    rules: Rules,
+) -> Option<Sample> {
+    sample_of(triangles, &contacts(triangles, touching, p, rules))
+}
+
+fn contacts(
+    triangles: &[Triangle],
+    touching: &[u32],
+    p: [f64; 2],
+    rules: Rules,
+) -> Vec<(u32, Contact)> {
+    let mut contacts = Vec::new();
     for &index in touching {
-        let seen = Seen::new(&triangles[index as usize], rules.reach_m);
-        match seen.contact(p) {
+        let triangle = &triangles[index as usize];
+        if !may_touch(triangle, p, rules.reach_m) {
+            continue;
+        }
+        match Seen::new(triangle, rules.reach_m).contact(p) {
             Contact::None => {}
             contact => contacts.push((index, contact)),
         }
     }
-    let sample = sample_of(triangles, &contacts)?;
-    Some((sample, of_contacts(triangles, &contacts, p, &sample, rules)))
+    contacts
 }
 
 fn of_contacts(

@@ -370,7 +370,7 @@ fn point_areas_m2(
     for (&place, &height_m) in points.grid_index.iter().zip(&points.height_m) {
         heights_m[place] = Some(height_m);
     }
-    let height_at = |p: [f64; 2]| Some(probe.at(p)?.0.height_m.max(0.0));
+    let height_at = |p: [f64; 2]| Some(probe.sample(p)?.height_m.max(0.0));
     let (all, mut fine) = areas_m2(&points.grid, &heights_m, &height_at, progress)?;
     let of_points = |all: &[f64]| points.grid_index.iter().map(|&place| all[place]).collect();
     if !fine.smooth.is_empty() {

@@ -123,6 +123,17 @@ impl<'a> Probe<'a> {
         }
     }
 
+    /// What [`Self::at`] gives, without the marks.
+    #[must_use]
+    pub fn sample(&self, p: [f64; 2]) -> Option<Sample> {
+        match &self.kind {
+            Kind::Mesh {
+                mesh, index, rules, ..
+            } => point_flags::sample_at(mesh.triangles(), index.at(p), p, *rules),
+            Kind::Primitive(primitive) => primitive.sample(p[0], p[1]),
+        }
+    }
+
     /// How many triangles a look at a point compares it with.
     pub(super) fn near(&self, p: [f64; 2]) -> usize {
         match &self.kind {

@@ -193,6 +193,15 @@ impl Seen {
     }
 }
 
+/// False where a triangle's box in plan lies beyond `reach` of `p`: then [`Seen::contact`] is none.
+pub(super) fn may_touch(triangle: &Triangle, p: Point, reach: f64) -> bool {
+    let [a, b, c] = triangle;
+    let within = |k: usize| {
+        p[k] >= a[k].min(b[k]).min(c[k]) - reach && p[k] <= a[k].max(b[k]).max(c[k]) + reach
+    };
+    within(0) && within(1)
+}
+
 /// Whether a triangle is upright, or as nearly as the file's rounding can make a wall that did.
 pub(super) fn is_wall(triangle: &Triangle, reach: f64) -> bool {
     let vertices = ordered(triangle);

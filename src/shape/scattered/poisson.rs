@@ -151,7 +151,7 @@ fn count_areas(
         }
         let p = [0, 1]
             .map(|k| probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64);
-        if probe.at(p).is_none() {
+        if probe.sample(p).is_none() {
             continue;
         }
         let nearest = cells.nearest(p, 2);
