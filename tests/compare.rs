@@ -16,7 +16,7 @@ use serde_json::Value;
 
 fn main() -> ExitCode {
     needs::run(trials! {
-        None => [an_object_does_not_differ_from_itself, the_order_does_not_matter, a_lifted_surface_is_apart_by_its_height_with_feedback, beside_an_object_there_is_no_force_with_feedback, stronger_currents_only_lift_weak_forces_over_the_threshold, the_unpowered_steel_pulls_on_both_alike, where_nothing_can_be_rendered_nothing_is_compared, the_bytes_do_not_depend_on_threads, the_command_reports_draws_and_refuses],
+        None => [an_object_does_not_differ_from_itself, the_order_does_not_matter, the_map_holds_the_largest_difference_with_its_sign, a_lifted_surface_is_apart_by_its_height_with_feedback, beside_an_object_there_is_no_force_with_feedback, stronger_currents_only_lift_weak_forces_over_the_threshold, the_unpowered_steel_pulls_on_both_alike, where_nothing_can_be_rendered_nothing_is_compared, the_bytes_do_not_depend_on_threads, the_command_reports_draws_and_refuses],
         needs::python() => [the_confusions_are_what_the_readme_shows],
     })
 }
@@ -26,6 +26,7 @@ const OWN: CompareOptions = CompareOptions {
     lambda_n_per_m: None,
     jnd: JND,
     tolerance: None,
+    maps: false,
 };
 
 fn design(changes: &[(&str, &str)]) -> Design {
@@ -107,6 +108,39 @@ fn the_order_does_not_matter() {
         };
         assert!((of(here) / of(there) - 1.0).abs() < 1e-12);
     }
+}
+
+fn the_map_holds_the_largest_difference_with_its_sign() {
+    let design = design(&[]);
+    let options = CompareOptions { maps: true, ..OWN };
+    // Nothing is compared with what cannot be rendered.
+    let shapes = [wedge("a"), dome("b"), flat("nothing", 0.0)];
+    let drawn = compared(&design, &shapes, &options);
+    let swapped = compared(&design, &[dome("b"), wedge("a")], &options);
+    assert_eq!((drawn.maps.len(), swapped.maps.len()), (4, 4));
+    let values = |report: &CompareReport, map: usize| -> Vec<f64> {
+        report.maps[map].values.iter().flatten().copied().collect()
+    };
+    let largest = |drive: usize| {
+        let both = [drive, 2 + drive].map(|map| values(&drawn, map));
+        both.concat()
+            .into_iter()
+            .fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
+    let pair = &drawn.pairs[0];
+    assert_eq!(
+        [largest(0), largest(1)].map(Some),
+        [pair.static_jnd, pair.feedback_jnd]
+    );
+    for map in 0..4 {
+        let negative: Vec<f64> = values(&swapped, (map + 2) % 4).iter().map(|v| -v).collect();
+        assert_eq!(values(&drawn, map), negative, "{map}");
+    }
+    // The dome leaves the corners of its grid free.
+    assert!(values(&drawn, 2).len() < values(&drawn, 0).len());
+    let svg = drawn.map().drawing().svg();
+    assert!(svg.contains("a over b / JND on b, position feedback"));
+    assert!(compared(&design, &shapes, &OWN).maps.is_empty());
 }
 
 fn a_lifted_surface_is_apart_by_its_height_with_feedback() {

@@ -5,12 +5,13 @@
 
 use std::path::PathBuf;
 
+use super::documents::DesignDocument;
 use super::failure::Failure;
 use super::printer::{Printer, Stream};
 use super::values::FileArgument;
 use crate::RunError;
 use crate::bundle::artefact::Input;
-use crate::bundle::atomic::{self, Overwrite, write};
+use crate::bundle::atomic::{self, Overwrite, check_distinct, write};
 use crate::design::message_text::shown_path;
 use crate::plot::drawing::{Drawing, DrawingFormat};
 
@@ -29,6 +30,24 @@ pub fn table_or_drawing(out: &FileArgument, plot: Option<&FileArgument>) -> Resu
         ));
     }
     Ok(())
+}
+
+/// The drawings of a command that makes several, each checked before the run.
+///
+/// # Errors
+/// Two that go to one place; see [`Picture::check`].
+pub fn checked<'a, const COUNT: usize>(
+    files: [Option<&'a FileArgument>; COUNT],
+    force: bool,
+    document: &DesignDocument,
+) -> Result<[Option<Picture<'a>>; COUNT], Failure> {
+    check_distinct(files.iter().flatten().map(|file| file.as_given())).map_err(RunError::from)?;
+    let pictures =
+        files.map(|file| file.map(|file| Picture::new(file, force, document.also_read())));
+    for picture in pictures.iter().flatten() {
+        picture.check(std::slice::from_ref(&document.input))?;
+    }
+    Ok(pictures)
 }
 
 /// A drawing or a page that a run is to make, and what of its files it must not replace.

@@ -89,6 +89,7 @@ pub fn picture(design: &Design, progress: &dyn Progress) -> Result<Option<Slices
                 Vec::new(),
             ),
         ],
+        columns: 3,
         curves_title: String::new(),
         curves: Vec::new(),
     }))

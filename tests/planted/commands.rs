@@ -115,10 +115,13 @@ pub const COMMANDS: &[Writes] = &[
             "replay bundles/air/bump --synthesize circle --duration 1 --trajectory-out out/made.csv --out out/replay.csv",
         )
     },
-    writes("evaluate", "evaluate air.toml --plot out/array.svg"),
+    writes(
+        "evaluate",
+        "evaluate air.toml --plot out/array.svg --plot-field out/field.svg",
+    ),
     writes(
         "compare",
-        "compare air.toml bump.toml knob.toml --plot out/compare.svg",
+        "compare air.toml bump.toml knob.toml --plot out/compare.svg --plot-where out/where.svg",
     ),
     writes(
         "sweep plan",

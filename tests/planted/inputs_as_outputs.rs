@@ -23,9 +23,11 @@ const SPELLINGS: [&str; 7] = [
 ];
 
 /// Flags that name an output file.
-const FLAGS: [&str; 6] = [
+const FLAGS: [&str; 8] = [
     "--out",
     "--plot",
+    "--plot-field",
+    "--plot-where",
     "--report",
     "--trajectory-out",
     "--vfield",

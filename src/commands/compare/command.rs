@@ -9,7 +9,7 @@ use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::pictures::Picture;
+use crate::cli::pictures;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -31,8 +31,8 @@ use crate::design::Need;
 #[command(after_long_help = page(Codes::Writing, &[
     ("fluxform compare designs/seed_air.toml shapes/flat.toml shapes/wedge.toml",
      "two of the seed's objects on its array without cores"),
-    ("fluxform compare designs/seed_air.toml shapes/*.toml --plot apart.svg",
-     "all of them, with a picture"),
+    ("fluxform compare designs/seed_air.toml shapes/*.toml --plot apart.svg --plot-where where.svg",
+     "all of them, with pictures of how much and where"),
     ("fluxform compare designs/seed_air.toml shapes/flat.toml shapes/wedge.toml --lambda 0.5",
      "both with the same force constant"),
 ]))]
@@ -55,6 +55,13 @@ pub struct Compare {
     /// Draw the differences as matrices to this file (.svg, .png or .pdf), `-` for standard output
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
+    /// Draw where they differ
+    ///
+    /// For every two objects, on the plan of either, static currents beside position feedback: how much
+    /// stronger the first pushes up than the second, in just-noticeable differences of the upward force,
+    /// red where it is stronger and blue where it is weaker.
+    #[arg(long, value_name = "FILE", value_parser = values::picture)]
+    plot_where: Option<FileArgument>,
     #[command(flatten)]
     tolerance: Tolerance,
     #[command(flatten)]
@@ -80,12 +87,10 @@ impl Compare {
             lambda_n_per_m: self.lambda,
             jnd: self.jnd,
             tolerance: self.tolerance.tolerance,
+            maps: self.plot_where.is_some(),
         };
-        let force = self.writing.force;
-        let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));
-        if let Some(plot) = &plot {
-            plot.check(std::slice::from_ref(&document.input))?;
-        }
+        let files = [&self.plot, &self.plot_where].map(Option::as_ref);
+        let [plot, plot_where] = pictures::checked(files, self.writing.force, &document)?;
         allow(
             costs(&document.design, &shapes, self.tolerance.tolerance),
             cost_origin(&shapes),
@@ -100,6 +105,9 @@ impl Compare {
         let mut place = Stream::Output;
         if let Some(plot) = &plot {
             place = plot.draw(&report.inputs, &report.picture().drawing(), printer)?;
+        }
+        if let Some(plot) = &plot_where {
+            place = place.or(plot.draw(&report.inputs, &report.map().drawing(), printer)?);
         }
         printer.summary(place, &printer.with_warnings(&report), || summary(&report))?;
         accuracy_check(&report.accuracy_missed)?;

@@ -88,6 +88,14 @@ fn scale_n(a: Felt, b: Felt, jnd: f64) -> f64 {
     (jnd * length(a.force_n).max(length(b.force_n))).max(DETECTION_THRESHOLD_N)
 }
 
+/// How much stronger `a` pushes up than `b`, in just-noticeable differences of the upward force; negative
+/// where it is weaker.
+#[must_use]
+pub fn stronger(a: Felt, b: Felt, jnd: f64) -> f64 {
+    let (a, b) = (a.upward(), b.upward());
+    (a.force_n[2] - b.force_n[2]) / scale_n(a, b, jnd)
+}
+
 /// Compares over the places of both surfaces, neither of them empty.
 #[must_use]
 pub fn difference(surfaces: [Sides; 2], jnd: f64) -> Difference {
@@ -142,6 +150,8 @@ mod tests {
         let squares = 0.25 * ((1.0_f64 / 7.0).powi(2) + 1.5 * 1.5) + 0.5 / 0.0049;
         assert!((found.rms / squares.sqrt() - 1.0).abs() < 1e-14);
         assert_eq!(found.felt_share, 0.75);
+        assert_eq!(stronger(c[0], d[0], 0.07), found.largest);
+        assert_eq!(stronger(d[0], c[0], 0.07), -found.largest);
         assert!((found.error(1e-4, 0.07) - 1e-4 / 0.07).abs() < 1e-15);
     }
 

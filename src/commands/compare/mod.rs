@@ -23,7 +23,7 @@ use crate::lambda::sideways::SIDEWAYS_WEIGHT;
 use crate::lambda::{
     self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status, VectorAllocator,
 };
-use crate::plot::matrix::{MatrixPlot, Panel};
+use crate::plot::slices::Slice;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
@@ -35,6 +35,7 @@ use crate::units::DETECTION_THRESHOLD_N;
 
 pub(crate) mod command;
 pub mod difference;
+mod pictures;
 mod text;
 
 use difference::{Difference, Felt, Sides, difference};
@@ -51,6 +52,8 @@ pub struct CompareOptions {
     pub jnd: f64,
     /// Tolerance of the forces; `None` for the default.
     pub tolerance: Option<f64>,
+    /// Keep where the objects differ, for [`CompareReport::map`].
+    pub maps: bool,
 }
 
 /// The comparison, SI. Serialised it is the JSON result.
@@ -76,6 +79,9 @@ pub struct CompareReport {
     pub pairs: Vec<Pair>,
     /// Errors of the forces and of the differences.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// Where every two differ, if that was asked for.
+    #[serde(skip)]
+    pub maps: Vec<Slice>,
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -231,16 +237,7 @@ pub fn run(
             )
         })
         .collect::<Result<Vec<Object>, RunError>>()?;
-    if let Some(core) = &scene.core {
-        warnings.extend(core.warnings.iter().cloned());
-        if matches!(core.material, Material::Curve(_)) {
-            warnings.push(
-                "the forces of several currents are added up, which holds as long as the steel is \
-                 linear; `lambda` states the change by the B-H curve at its currents"
-                    .to_owned(),
-            );
-        }
-    }
+    warnings.extend(of_steel(&scene));
     let fields = fields(&scene, &objects, progress)?;
     let stage = proven_accuracy(&scene, &solved);
     let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
@@ -265,10 +262,30 @@ pub fn run(
             .map(|(k, (object, fields))| object.compared(&fields[k]))
             .collect(),
         pairs,
+        maps: match options.maps {
+            true => pictures::maps(&objects, &fields, options.jnd),
+            false => Vec::new(),
+        },
         accuracy_missed: missed(&accuracy, solved.tolerance),
         accuracy,
         warnings,
     })
+}
+
+/// What there is to say of the steel.
+fn of_steel(scene: &Scene) -> Vec<String> {
+    let Some(core) = &scene.core else {
+        return Vec::new();
+    };
+    let mut warnings = core.warnings.clone();
+    if matches!(core.material, Material::Curve(_)) {
+        warnings.push(
+            "the forces of several currents are added up, which holds as long as the steel is \
+             linear; `lambda` states the change by the B-H curve at its currents"
+                .to_owned(),
+        );
+    }
+    warnings
 }
 
 /// # Errors
@@ -571,37 +588,5 @@ impl CompareReport {
     pub fn without_constant(&self) -> Vec<&str> {
         let none = self.shapes.iter().filter(|s| s.lambda_n_per_m.is_none());
         none.map(|shape| shape.shape.as_str()).collect()
-    }
-
-    /// The differences as matrices: largest and rms, static beside feedback.
-    #[must_use]
-    pub fn picture(&self) -> MatrixPlot {
-        let names: Vec<String> = self.shapes.iter().map(|s| s.shape.clone()).collect();
-        let panel = |title: &str, pick: fn(&Pair) -> Option<f64>| {
-            let mut values = vec![Some(0.0); names.len() * names.len()];
-            let at = |name: &str| names.iter().position(|n| n == name);
-            for pair in &self.pairs {
-                if let (Some(i), Some(j)) = (at(&pair.a), at(&pair.b)) {
-                    values[i * names.len() + j] = pick(pair);
-                    values[j * names.len() + i] = pick(pair);
-                }
-            }
-            Panel {
-                title: title.to_owned(),
-                values,
-            }
-        };
-        let panels = vec![
-            panel("largest, static currents", |p| p.static_jnd),
-            panel("largest, position feedback", |p| p.feedback_jnd),
-            panel("rms, static currents", |p| p.static_rms_jnd),
-            panel("rms, position feedback", |p| p.feedback_rms_jnd),
-        ];
-        MatrixPlot {
-            title: format!("{}: just-noticeable differences of force", self.design),
-            panels,
-            columns: 2,
-            names,
-        }
     }
 }

@@ -3,9 +3,7 @@
 use clap::Args;
 
 use super::{Evaluation, LimitedBy, Transient, evaluate};
-use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::atomic::check_distinct;
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
@@ -14,7 +12,7 @@ use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row};
-use crate::cli::pictures::Picture;
+use crate::cli::pictures;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_with_error};
 use crate::cli::start::accuracy_check;
@@ -75,15 +73,8 @@ impl Evaluate {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
         let design = &document.design;
-        let force = self.writing.force;
         let files = [&self.plot, &self.plot_field].map(Option::as_ref);
-        check_distinct(files.iter().flatten().map(|file| file.as_given()))
-            .map_err(RunError::from)?;
-        let [plot, plot_field] =
-            files.map(|file| file.map(|file| Picture::new(file, force, document.also_read())));
-        for picture in [&plot, &plot_field].into_iter().flatten() {
-            picture.check(std::slice::from_ref(&document.input))?;
-        }
+        let [plot, plot_field] = pictures::checked(files, self.writing.force, &document)?;
         let steel = of_steel(design, self.tolerance.tolerance);
         allow(steel, CostOrigin::Document, printer)?;
         let bar = begin(printer);

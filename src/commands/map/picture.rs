@@ -67,6 +67,7 @@ pub(super) fn picture(design: &Design, map: &MapArrays) -> SlicesPlot {
             design.name
         ),
         slices: slices.collect(),
+        columns: 3,
         curves_title: "F_z of one ampere above its coil".to_owned(),
         curves: curves(&force, axes_m, z),
     }

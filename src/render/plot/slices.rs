@@ -20,8 +20,6 @@ const TITLE_PX: u32 = 14;
 const LINE_PX: f64 = 1.0;
 /// Where there is no field: in steel or hardly off it.
 const STEEL: &str = "#c3c9cf";
-/// Panels beside each other.
-const COLUMNS: usize = 3;
 /// Colours of the largest negative value and of the largest positive one, which stay apart for the
 /// colour-blind; between them white, which is zero.
 const ENDS: [[f64; 3]; 2] = [[5.0, 48.0, 97.0], [178.0, 24.0, 43.0]];
@@ -54,7 +52,7 @@ impl SliceLine {
 pub struct Slice {
     /// The quantity, without its unit, and the place of the plane.
     pub title: [String; 2],
-    /// The SI unit.
+    /// The SI unit, or [`Slice::JND`].
     pub unit: &'static str,
     /// Names of the axes, without their unit.
     pub axes: [&'static str; 2],
@@ -79,6 +77,11 @@ pub struct HeightCurve {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Slice {
+    /// The unit of just-noticeable differences, which no prefix goes with.
+    pub const JND: &str = "JND";
+}
+
 /// Data of the drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlicesPlot {
@@ -86,6 +89,8 @@ pub struct SlicesPlot {
     pub title: String,
     /// Panels, from left to right, then downwards.
     pub slices: Vec<Slice>,
+    /// Panels beside each other, at most.
+    pub columns: usize,
     /// The quantity of the curves, without its unit.
     pub curves_title: String,
     /// In the last panel, if there are any.
@@ -99,8 +104,8 @@ impl SlicesPlot {
         let curves = (!self.curves.is_empty()).then(|| self.curves());
         let panels = self.slices.iter().map(slice).chain(curves);
         let (plots, layouts): (Vec<_>, Vec<_>) = panels.unzip();
-        let rows = plots.len().div_ceil(COLUMNS);
-        let mut figure = Figure::new(rows, plots.len().min(COLUMNS))
+        let columns = plots.len().min(self.columns).max(1);
+        let mut figure = Figure::new(plots.len().div_ceil(columns).max(1), columns)
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(plots)
@@ -139,7 +144,10 @@ impl SlicesPlot {
 
 fn slice(slice: &Slice) -> (Vec<Plot>, Layout) {
     let values: Vec<f64> = slice.values.iter().flatten().copied().collect();
-    let (scale, unit) = readable(&values, slice.unit);
+    let (scale, unit) = match slice.unit {
+        Slice::JND => (1.0, slice.unit.to_owned()),
+        unit => readable(&values, unit),
+    };
     let largest = values
         .iter()
         .fold(0.0_f64, |most, v| most.max(scale * v.abs()));
@@ -247,6 +255,7 @@ mod tests {
                     stroke: SliceLine::FIELD,
                 }],
             }],
+            columns: 3,
             curves_title: "above the axis".to_owned(),
             curves: vec![HeightCurve {
                 name: "coils 0, 2".to_owned(),
