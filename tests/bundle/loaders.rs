@@ -11,7 +11,7 @@ use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::{Renderer, Step};
 
 use fluxform_testing::bundle::*;
-use fluxform_testing::loaders::c_loader;
+use fluxform_testing::loaders::{c_loader, cpp_loader};
 use fluxform_testing::needs::{self, SANITIZERS, Trial};
 use fluxform_testing::{Random, root, trials};
 
@@ -29,6 +29,7 @@ pub fn trials() -> Vec<Trial> {
             c_gives_the_forces_of_the_library,
             extreme_limits_give_the_same_currents_in_c,
         ],
+        needs::cpp_compiler() => [cpp_gives_the_forces_of_the_library],
         needs::sanitizers() => [the_c_loader_survives_damaged_files],
     }
 }
@@ -183,6 +184,7 @@ fn sideways_terms(line: &[f64]) -> f64 {
 enum Loader {
     Python,
     C,
+    Cpp,
 }
 
 impl Loader {
@@ -200,6 +202,11 @@ impl Loader {
                 let mut c = Command::new(c_loader(folder, &[]));
                 c.arg(bundle.join("map.npz"));
                 ("C", c)
+            }
+            Self::Cpp => {
+                let mut cpp = Command::new(cpp_loader(folder));
+                cpp.arg(bundle.join("map.npz"));
+                ("C++", cpp)
             }
         };
         compare(
@@ -313,6 +320,10 @@ fn python_gives_the_forces_of_the_library() {
 
 fn c_gives_the_forces_of_the_library() {
     forces_on_samples(Some(&Loader::C));
+}
+
+fn cpp_gives_the_forces_of_the_library() {
+    forces_on_samples(Some(&Loader::Cpp));
 }
 
 /// Broke: with a lower limit of -1e30 A the C loader answered 8 A where the sum may be 5 A.

@@ -96,6 +96,14 @@ pub fn c_compiler() -> Option<String> {
     missing("a C compiler", &ASKED, || answers("cc", &["--version"]))
 }
 
+/// Compilers of C and C++, where one is missing.
+#[must_use]
+pub fn cpp_compiler() -> Option<String> {
+    static ASKED: OnceLock<bool> = OnceLock::new();
+    let cpp = || missing("a C++ compiler", &ASKED, || answers("c++", &["--version"]));
+    c_compiler().or_else(cpp)
+}
+
 /// A C compiler with the address and undefined behaviour sanitizers, where it is missing.
 #[must_use]
 pub fn sanitizers() -> Option<String> {
