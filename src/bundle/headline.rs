@@ -207,7 +207,7 @@ pub struct FeltForce {
 const NOT_MODELLED: [&str; 6] = [
     "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",
     "the coils' heat: it decides power and limits, not the force of a given current",
-    "manufacture: places and turns of the coils, gaps, permeability (`probe --scan` measures them)",
+    "manufacture: places and turns of the coils, gaps, permeability (`probe --compare` measures them)",
     "the steel's hysteresis and eddy currents",
     "the finger: its compliance, and where on it the magnet sits",
     "the magnet's body under tilt: its moment turns, its ends do not move",

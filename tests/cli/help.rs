@@ -1,8 +1,12 @@
 //! Help pages, their examples, completions and manual pages.
 
+use std::collections::BTreeSet;
+
 use fluxform::bundle::artefact::SCHEMA_VERSION;
 
 use fluxform_testing::place::Place;
+use fluxform_testing::root;
+use fluxform_testing::tree::tree;
 
 /// Every command that the program takes, with the commands below it: `sweep`, `sweep plan`.
 pub fn commands() -> Vec<Vec<String>> {
@@ -52,6 +56,46 @@ fn every_command_explains_itself() {
         whole.trim().lines().collect::<Vec<_>>(),
         [crate_version, schema.as_str()]
     );
+}
+
+/// Texts and comments name flags as `` `command --flag` ``.
+#[test]
+fn every_flag_that_a_text_names_is_one() {
+    fn flags_of(command: &clap::Command) -> BTreeSet<String> {
+        let longs = command.get_arguments().filter_map(clap::Arg::get_long);
+        let own = longs.map(|long| format!("--{long}"));
+        own.chain(command.get_subcommands().flat_map(flags_of))
+            .collect()
+    }
+    let main = fluxform::commands::command();
+    let own = main.get_arguments().filter_map(clap::Arg::get_long);
+    let common: BTreeSet<String> = own.map(|long| format!("--{long}")).collect();
+    let texts = tree(&root().join("src"))
+        .into_iter()
+        .filter(|(path, _)| path.ends_with(".rs"));
+    let (mut named, mut wrong) = (0, Vec::new());
+    for (path, text) in texts {
+        let text = String::from_utf8(text).unwrap();
+        // Every second piece is within backticks.
+        for quoted in text
+            .lines()
+            .flat_map(|line| line.split('`').skip(1).step_by(2))
+        {
+            let mut words = quoted.split_whitespace();
+            let Some(command) = words.next().and_then(|word| main.find_subcommand(word)) else {
+                continue;
+            };
+            let known = flags_of(command);
+            for word in words.filter(|word| word.starts_with("--")) {
+                let flag = word.split('=').next().unwrap_or_default();
+                named += 1;
+                if !known.contains(flag) && !common.contains(flag) {
+                    wrong.push(format!("{path}: `{quoted}`"));
+                }
+            }
+        }
+    }
+    assert!(named > 20 && wrong.is_empty(), "{named}, {wrong:#?}");
 }
 
 #[test]
