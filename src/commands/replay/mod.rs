@@ -130,7 +130,7 @@ impl Opened {
         synthesis.trajectory(self.renderer.heights(), self.renderer.map())
     }
 
-    /// The array, as far as the bundle tells.
+    /// The array, as far as the bundle states it.
     fn below(&self) -> Below<'_> {
         let positions_m = &self.bundle.manifest.array.positions_m[..];
         let design = Design::read(&self.bundle.folder.join(DESIGN_FILE), Need::SWEEP);

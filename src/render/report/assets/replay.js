@@ -19,7 +19,7 @@ function replay(place) {
   const button = add(control, "button", { type: "button" }, "Play");
   const label = add(control, "label", {}, "time");
   const slider = add(label, "input", { type: "range", min: 0, max: Math.max(0, t.length - 1), step: 1, value: 0 });
-  const told = add(control, "output");
+  const shown = add(control, "output");
   const holder = add(place, "div", { class: "pair" });
   const strip = add(place, "div");
   let move = () => {};
@@ -129,8 +129,8 @@ function replay(place) {
 
   function show() {
     const k = Number(slider.value);
-    told.textContent = `${say(t[k], 4)} s`;
-    slider.setAttribute("aria-valuetext", `${told.textContent}: ${numbersOf(k)}`);
+    shown.textContent = `${say(t[k], 4)} s`;
+    slider.setAttribute("aria-valuetext", `${shown.textContent}: ${numbersOf(k)}`);
     now.textContent = numbersOf(k);
     move(k);
   }
