@@ -5,7 +5,7 @@ use super::core_material::{Material, SceneCore};
 use crate::RunError;
 use crate::design::iron::{Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::{Coupling, Design};
-use crate::field::iron::array::{IronArray, IronPeaks, Peak};
+use crate::field::iron::array::{IronArray, IronPeaks, Peak, Unsolved};
 use crate::field::iron::bodies::{Body, Coils, Iron, Outline, Plate, Solid, UPRIGHT};
 use crate::field::iron::face::Point;
 use crate::field::steel::CoreShape;
@@ -156,7 +156,7 @@ impl SceneIron {
     /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` up.
     ///
     /// # Errors
-    /// A core beside the plate; a node on a winding's edge.
+    /// A core beside the plate; a node on a winding's edge; more steel than memory allows.
     pub(super) fn solve(
         &self,
         scene: &Scene,
@@ -175,7 +175,13 @@ impl SceneIron {
         for (body, chi) in &self.bodies {
             iron = iron.with(body.faces(), *chi);
         }
-        Ok(IronArray::new(coils, &iron, tolerance, lowest_m)?)
+        IronArray::new(coils, &iron, tolerance, lowest_m).map_err(|fault| match fault {
+            Unsolved::OnEdge(on_edge) => on_edge.into(),
+            Unsolved::TooLarge { .. } => RunError::Input(format!(
+                "the cores with [plate] and [[iron]]: {fault}; take fewer coils, place them alike about two planes, \
+                 or leave steel out"
+            )),
+        })
     }
 
     /// Distance of a place from the nearest of it, m; below nothing inside.

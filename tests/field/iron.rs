@@ -1,7 +1,7 @@
 //! Steel of any shape against the solvers of axisymmetric cores and against images.
 
 use fluxform_field::components::Components;
-use fluxform_field::iron::array::IronArray;
+use fluxform_field::iron::array::{IronArray, Unsolved};
 use fluxform_field::iron::bodies::{Coils, Fault, Iron, Outline, Plate};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
@@ -224,4 +224,26 @@ fn a_core_beside_the_plate_is_refused() {
     let positions_m = grid();
     let fault = Iron::new(coils(&positions_m, 999.0), Some(&small));
     assert_eq!(fault, Err(Fault::BesidePlate(0)));
+}
+
+/// What memory does not hold is refused before it is built; mirrors make it a quarter.
+#[test]
+fn more_steel_than_memory_holds_is_refused() {
+    let cores = |shift_m: f64| -> Vec<[f64; 2]> {
+        let place = |k: i32| 0.05 * (f64::from(k) - 4.5);
+        let mut places: Vec<[f64; 2]> = (0..100).map(|k| [place(k % 10), place(k / 10)]).collect();
+        places[0][0] += shift_m;
+        places
+    };
+    let plate = plate(Outline::Rectangle([0.6; 2]), -0.11, 0.005, 999.0);
+    let refused = |places: &[[f64; 2]]| {
+        let iron = Iron::new(coils(places, 999.0), Some(&plate)).unwrap();
+        match IronArray::new(coils(places, 999.0), &iron, 1e-2, 0.05) {
+            Err(Unsolved::TooLarge { unknowns, images }) => (unknowns, images),
+            other => panic!("{:?}", other.map(|array| array.size())),
+        }
+    };
+    let (alike, moved) = (refused(&cores(0.0)), refused(&cores(1e-3)));
+    assert_eq!((alike.1, moved.1), (4, 1));
+    assert!(moved.0 >= 4 * alike.0, "{moved:?} {alike:?}");
 }

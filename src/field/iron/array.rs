@@ -34,6 +34,42 @@ const CLIMBS: usize = 12;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
 
+/// Why steel is not solved.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Unsolved {
+    /// A node on a winding's edge.
+    #[error(transparent)]
+    OnEdge(#[from] OnEdge),
+    /// Its matrices are too large at the second resolution already, by which errors are estimated.
+    #[error(
+        "its surface takes {unknowns} unknowns of {images} mirrored parts, {:.1} GB, at most {:.1} are given to it",
+        gigabytes(*.images * .unknowns.pow(2)), gigabytes(MOST_ENTRIES)
+    )]
+    TooLarge {
+        /// Of one mirrored part.
+        unknowns: usize,
+        /// Number of the parts.
+        images: usize,
+    },
+}
+
+fn gigabytes(entries: usize) -> f64 {
+    entries as f64 * size_of::<f64>() as f64 * 1e-9
+}
+
+/// The finest of the [`RESOLUTIONS`] that memory allows, the second at least.
+fn finest(iron: &Iron) -> Result<usize, Unsolved> {
+    let images = iron.images().len();
+    let unknowns =
+        |tier: usize| Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier])).size();
+    let fits = |tier: &usize| images * unknowns(*tier).pow(2) <= MOST_ENTRIES;
+    let finest = (1..RESOLUTIONS.len()).take_while(fits).last();
+    finest.ok_or_else(|| Unsolved::TooLarge {
+        unknowns: unknowns(1),
+        images,
+    })
+}
+
 /// The solved steel, per ampere of every winding.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct IronArray {
@@ -66,20 +102,19 @@ impl IronArray {
     /// [`IronArray::relative_error`] says what was reached.
     ///
     /// # Errors
-    /// A node on a winding's edge.
+    /// [`Unsolved`].
     pub fn new(
         coils: Coils<'_>,
         iron: &Iron,
         tolerance: f64,
         lowest_m: f64,
-    ) -> Result<Self, OnEdge> {
-        let first = (-tolerance.log10().round()).clamp(1.0, 5.0) as usize - 1;
+    ) -> Result<Self, Unsolved> {
+        let wanted = (-tolerance.log10().round()).clamp(1.0, 5.0) as usize - 1;
+        let last = finest(iron)?;
+        // The error is the difference of two.
+        let first = wanted.min(last - 1);
         let mut coarse = Self::at_resolution(coils, iron, tolerance, first)?;
-        for (tier, resolution) in RESOLUTIONS.iter().enumerate().skip(first + 1) {
-            let surface = Surface::new(iron.part(), &iron.resolution(*resolution));
-            if iron.images().len() * surface.size().pow(2) > MOST_ENTRIES {
-                break;
-            }
+        for tier in first + 1..=last {
             let mut fine = Self::at_resolution(coils, iron, tolerance, tier)?;
             fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
             coarse.coarser = None;
