@@ -37,7 +37,7 @@ typedef struct fluxform_bundle {
     double *gradient_t_per_m_per_a; /* [map][z][y][x][3][3]; NULL unless the magnet is tilted */
     double moment_a_m2[3];        /* the magnet */
     size_t coil_count;            /* coils of the array */
-    double *current_min_a;        /* one a coil of the array */
+    double *current_min_a;        /* one per coil of the array */
     double *current_max_a;
     double *resistance_ohm;
     int has_total_current_max;    /* whether there is such a limit */
@@ -50,7 +50,7 @@ typedef struct fluxform_bundle {
     double *height_x_m, *height_y_m;
     double *height_m;             /* [y][x] */
     double *has_height;           /* [y][x]: 1 where there is a surface, else 0 */
-    double *static_current_a;     /* the bundle's fixed currents, one a coil of the array */
+    double *static_current_a;     /* the bundle's fixed currents, one per coil of the array */
     double *requested_direction;  /* [y][x][3]: force vector over lambda times the height; NULL: upward alone */
     double sideways_weight;       /* out of reach a sideways error counts as this share of an upward one */
     /* Price of power, sensor's bound, square and mean of the magnet's strength, square of a driver's error; NULL
@@ -110,7 +110,7 @@ int fluxform_direction(const fluxform_bundle *bundle, double x_m, double y_m, do
 
 /* The currents [A] of least power that give wanted_n for the forces per ampere given, within the
  * limits of every current and of their sum (equation 8), or the nearest force; none for a force that
- * is no number. Returns FLUXFORM_OK or FLUXFORM_SATURATED. */
+ * is not a number. Returns FLUXFORM_OK or FLUXFORM_SATURATED. */
 int fluxform_allocate(fluxform_bundle *bundle, const double *force_per_ampere, double wanted_n, double *currents);
 
 /* The same for a force vector: three numbers a coil, three wanted. The nearest force is the one whose

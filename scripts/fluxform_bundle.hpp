@@ -71,7 +71,7 @@ public:
     /* Everything that the bundle holds. */
     const fluxform_bundle &data() const { return bundle_; }
 
-    /* The currents to command, A, one a coil. */
+    /* The currents to command, A, one per coil. */
     Step currents(const Vector &at_m, std::vector<double> &current)
     {
         return step(fluxform_currents, at_m, current);

@@ -120,7 +120,7 @@
 //!   to stop a run implements [`progress::Progress`]; [`progress::Silent`] does neither.
 //! - Until version 1.0 a minor version may change this interface, and the changelog says so. Enums
 //!   that may grow and results are `#[non_exhaustive]`; options are written
-//!   `Options { wanted, ..Options::default() }`, so that a new one breaks nobody. The layout of
+//!   `Options { requested, ..Options::default() }`, so that a new one breaks nobody. The layout of
 //!   artefacts has a version of its own, [`bundle::artefact::SCHEMA_VERSION`].
 //!
 //! # Rooms

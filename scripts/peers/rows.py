@@ -27,7 +27,7 @@ ENOUGH_S = 1.0
 
 
 def problem():
-    """What was asked for with --rows, None without."""
+    """What was requested with --rows, None without."""
     if "--rows" not in sys.argv:
         return None
     with open(sys.argv[sys.argv.index("--rows") + 1], encoding="utf-8") as file:

@@ -124,7 +124,7 @@ impl RequestedForce {
     }
 }
 
-/// What takes the place of a shape's own request, as far as it is given.
+/// Overrides of a shape's own request; absent parts stay as the shape has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ForceOverride {
     /// Where the force points.

@@ -1,4 +1,4 @@
-//! What is not exactly known of a display in use: bounds, each quantity evenly distributed within its own,
+//! Uncertainties of a display in use: bounds, each quantity evenly distributed within its own,
 //! as the Guide to the Expression of Uncertainty in Measurement (JCGM 100:2008, 4.3.7) takes a bound of
 //! which no more is known.
 

@@ -221,7 +221,7 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
         summary.coil.as_slice(),
     )?;
     same(
-        "map.npz has a passive_force_n where the manifest tells of it",
+        "map.npz has a passive_force_n that the manifest does not mention",
         map.passive_force_n.is_some(),
         summary.passive_force.is_some(),
     )?;

@@ -1,4 +1,4 @@
-//! What a result comes to: lambda with its error, the force that is given, and who uses the error
+//! The headline of a result: lambda with its error, the force that is given, and the parts of the error
 //! budget. Screen, JSON and page print this one struct.
 
 use schemars::JsonSchema;
@@ -75,7 +75,7 @@ impl BudgetName {
         }
     }
 
-    /// What to do about it.
+    /// The remedy, as the headline prints it.
     fn to_halve(self) -> &'static str {
         match self {
             Self::Points => "take about 1.5 times as many points along x and y",
@@ -112,7 +112,7 @@ pub enum FeltCause {
     /// The computation, from the file on: the budget.
     #[strum(serialize = "computation")]
     Computation,
-    /// What the coils cannot give within their limits, or no one asked them for.
+    /// The error of the currents: out of reach within their limits, or in components that were not requested.
     #[strum(serialize = "the currents themselves")]
     Currents,
     /// The position.
@@ -199,11 +199,11 @@ pub struct FeltForce {
     pub expected: FeltShares,
     /// The same split: the computation adds up with the others, whose squares do.
     pub parts: Vec<FeltPart>,
-    /// What is in none of them.
+    /// Effects that none of the parts covers.
     pub not_modelled: Vec<String>,
 }
 
-/// What no part of the felt error stands for.
+/// Effects that no part of the felt error covers.
 const NOT_MODELLED: [&str; 6] = [
     "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",
     "the coils' heat: it decides power and limits, not the force of a given current",
@@ -268,7 +268,7 @@ impl FeltForce {
     }
 }
 
-/// What a result comes to.
+/// The headline of a result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Headline {
     /// lambda in the digits that its error leaves, like `0.916 +- 0.004 N/m`.
@@ -286,7 +286,7 @@ pub struct Headline {
     pub force_error: f64,
     /// Who uses it, the largest first.
     pub budget: Vec<BudgetPart>,
-    /// What would halve the largest part.
+    /// The change that halves the largest part.
     pub to_halve: Option<String>,
     /// The share of the grid's cells through which the surface jumps, left out of `budget`: there the
     /// rendered force goes from one side's to the other's within a cell, whatever the grid.
@@ -295,7 +295,7 @@ pub struct Headline {
     /// The error of the force vector at the finger; absent in files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub felt: Option<FeltForce>,
-    /// What `--error` came to; absent without it.
+    /// The outcome of `--error`; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requested: Option<RequestedError>,
 }
@@ -310,7 +310,7 @@ pub struct RequestedError {
     pub error: f64,
     /// Whether the budget holds it.
     pub met: bool,
-    /// What the documents or flags fix and was obeyed.
+    /// Settings that the documents or flags fix, which were obeyed.
     pub fixed: Vec<String>,
     /// Points along x and y.
     pub points: [usize; 2],

@@ -43,7 +43,7 @@ pub struct LambdaFile {
     pub criterion: Criterion,
     /// The relative error that `jnd` allows to be added.
     pub jnd: f64,
-    /// Static currents at the chosen lambda, A, one a coil of the array: those of the least mean
+    /// Static currents at the chosen lambda, A, one per coil of the array: those of the least mean
     /// square error; with `maxmin` currents that leave no point too weak.
     pub currents_a: Option<Vec<f64>>,
     /// Root mean square of the force error at the chosen lambda, N.
@@ -73,14 +73,14 @@ pub struct LambdaFile {
     /// Coils broken or in series on request; absent when none are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wiring: Option<Wiring>,
-    /// The same object with one change at a time, the first as given; absent when not asked for.
+    /// The same object with one change at a time, the first as given; absent when not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variants: Option<Vec<LambdaVariant>>,
     /// The same object with position feedback, currents of their own at every point; absent when
-    /// not asked for.
+    /// not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback: Option<FeedbackFile>,
-    /// Currents and errors at the lambda asked for with `--at`; absent when none was.
+    /// Currents and errors at the requested lambda with `--at`; absent when none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<AtLambda>,
     /// Where the points are not the grid's: what that changes.
@@ -105,7 +105,7 @@ pub struct LambdaFile {
     /// files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hottest_coil: Option<Heating>,
-    /// What the result comes to; absent without a lambda and in files of programs without it.
+    /// The headline; absent without a lambda and in files of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub headline: Option<Headline>,
     /// Each stage's estimated error.
@@ -152,10 +152,10 @@ pub struct FeedbackFile {
     pub at_chosen: Option<Rendered>,
     /// With feedback at its own largest lambda; null without one.
     pub at_largest: Option<Rendered>,
-    /// The same demand above and below the surface; absent when not asked for.
+    /// The same demand above and below the surface; absent when not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shell: Option<FeedbackShell>,
-    /// Two fingers on the array at the chosen lambda; absent when not asked for.
+    /// Two fingers on the array at the chosen lambda; absent when not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_fingers: Option<TwoFingers>,
     /// The force vector; absent where the upward force alone is requested.
@@ -256,7 +256,7 @@ pub struct TolerancePoint {
     pub point: Option<usize>,
     /// That part of its tolerance.
     pub part: Option<f64>,
-    /// Currents that keep it, A, one a coil of the array.
+    /// Currents that keep it, A, one per coil of the array.
     pub currents_a: Option<Vec<f64>>,
 }
 
@@ -281,7 +281,7 @@ pub struct LambdaVariant {
     pub lambda_n_per_m: Option<f64>,
     /// Its change relative to the chosen one as given.
     pub relative_change: Option<f64>,
-    /// At the chosen lambda, A, one a coil of the array.
+    /// At the chosen lambda, A, one per coil of the array.
     pub currents_a: Option<Vec<f64>>,
     /// N.
     pub rms_error_n: Option<f64>,
@@ -314,7 +314,7 @@ pub struct WorkingPointForces {
 pub struct PathStep {
     /// N/m.
     pub lambda_n_per_m: f64,
-    /// A, one a coil of the array.
+    /// A, one per coil of the array.
     pub currents_a: Vec<f64>,
     /// The event, such as "coil 4 meets its upper limit".
     pub event: String,
@@ -325,7 +325,7 @@ pub struct PathStep {
 pub struct AtLambda {
     /// N/m.
     pub lambda_n_per_m: f64,
-    /// A, one a coil of the array.
+    /// A, one per coil of the array.
     pub currents_a: Vec<f64>,
     /// N.
     pub rms_error_n: f64,
@@ -351,7 +351,7 @@ pub struct WorstPointFile {
     pub worst_error_n: Option<f64>,
     /// The same over lambda times the largest height.
     pub relative_worst_error: Option<f64>,
-    /// Currents at the chosen lambda, A, one a coil of the array.
+    /// Currents at the chosen lambda, A, one per coil of the array.
     pub currents_a: Option<Vec<f64>>,
     /// Bound on the error of `worst_error_n`, N.
     pub gap_n: Option<f64>,
@@ -372,7 +372,7 @@ pub struct WorstPointStep {
     pub lambda_n_per_m: f64,
     /// t*, N.
     pub worst_error_n: f64,
-    /// A, one a coil of the array.
+    /// A, one per coil of the array.
     pub currents_a: Vec<f64>,
     /// The points that decide from here on, rows of `points.csv` from 0.
     pub active_points: Vec<usize>,
@@ -385,6 +385,6 @@ pub struct WorstPointStep {
 pub struct WorstPointAt {
     /// N.
     pub worst_error_n: f64,
-    /// A, one a coil of the array.
+    /// A, one per coil of the array.
     pub currents_a: Vec<f64>,
 }

@@ -272,7 +272,7 @@ pub struct ForceSummary {
     pub crease_points: usize,
     /// Points at rims and walls, where it is the normal of the face that is seen from above.
     pub rim_points: usize,
-    /// What the static currents render.
+    /// The force that the static currents render.
     pub static_currents: String,
 }
 

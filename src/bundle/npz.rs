@@ -1,7 +1,7 @@
 //! `map.npz`: axes, coil indices, maps per ampere, and what else a runtime needs.
 //!
 //! A stored zip of NPY 1.0 arrays with fixed time stamps: the same numbers give the same bytes.
-//! Besides the contract's arrays it holds the few numbers a runtime needs, so that C and MATLAB
+//! Beside the contract's arrays it holds the few numbers a runtime needs, so that C and MATLAB
 //! programs need not read JSON: `schema_version` (i64, 3), `moment_a_m2` (3), and one entry a coil
 //! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
 //! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the

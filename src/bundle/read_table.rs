@@ -193,7 +193,7 @@ fn not_a_number(column: &str, cell: &str) -> String {
     format!("column {column}: expected a finite number, found {shown:?}{advice}")
 }
 
-/// What is wrong with a table that is empty, or whose first line has the expected columns and another
+/// The fault of a table that is empty, or whose first line has the expected columns and another
 /// separator than commas.
 fn separated_by_commas(name: &str, text: &[u8], expected: &[&str]) -> Option<String> {
     let first = text

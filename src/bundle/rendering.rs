@@ -2,7 +2,7 @@
 //! heights on their grid, the static currents, and the coils' circuit.
 //!
 //! `height_x_m`, `height_y_m`, `height_m` `[y, x]` and `has_height` `[y, x]` (1 where there is a
-//! surface, 0 where not, and there the height is 0), `static_current_a` (one a coil),
+//! surface, 0 where not, and there the height is 0), `static_current_a` (one per coil),
 //! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
 //!
@@ -39,15 +39,15 @@ const LEAST_WEIGHT: f64 = 1e-6;
 pub struct Rendering {
     /// The object's surface.
     pub heights: HeightGrid,
-    /// The bundle's fixed currents, A, one a coil of the array.
+    /// The bundle's fixed currents, A, one per coil of the array.
     pub static_current_a: Vec<f64>,
     /// `[i][j]`: flux through coil i for one ampere in coil j, H, row by row.
     pub inductance_h: Vec<f64>,
     /// The supply's, V.
     pub voltage_v: Option<f64>,
-    /// What all three components of the force are to be; `None` where the upward one alone is requested.
+    /// The requested force vector; `None` where the upward component alone is requested.
     pub requested: Option<Requested>,
-    /// What currents chosen for the uncertainties need; `None` where none were given.
+    /// The setting of currents chosen for the uncertainties; `None` where none were given.
     pub robust: Option<RobustRuntime>,
 }
 

@@ -23,7 +23,7 @@ pub enum Answer {
 
 fluxform_base::choices!(Answer);
 
-/// What one finger is given, one entry a position.
+/// Force and error at one finger, one entry per position.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FingerRows {
     /// m.
@@ -76,7 +76,7 @@ impl FingerRows {
     }
 }
 
-/// The columns of `replay.csv`, one entry a position; currents coil by coil within a position.
+/// The columns of `replay.csv`, one entry per position; currents coil by coil within a position.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReplayRows {
     /// Number of coils.

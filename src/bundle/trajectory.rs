@@ -82,7 +82,7 @@ impl Trajectory {
         let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
         if !(last - first).is_finite() {
             return Err(TableError::one(format!(
-                "{name}: column t_s: from {first} to {last} is no time in seconds"
+                "{name}: column t_s: from {first} to {last} is not a time in seconds"
             )));
         }
         let finger = |axes: &[Vec<f64>]| match axes {
@@ -164,7 +164,7 @@ mod tests {
             ),
             (
                 "t_s,x_m,y_m,z_m\n-1e308,0,0,0.05\n1e308,0,0,0.05\n",
-                "is no time in seconds",
+                "is not a time in seconds",
             ),
         ] {
             let fault = read(text).unwrap_err();

@@ -20,7 +20,7 @@ pub struct Common {
     /// How results are printed: a summary for people, or one JSON object in SI units
     #[arg(long, global = true, hide_short_help = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
-    /// Say nothing but errors and the data asked for (JSON, CSV, `--out -`)
+    /// Say nothing but errors and the requested data (JSON, CSV, `--out -`)
     #[arg(short, long, global = true, hide_short_help = true)]
     pub quiet: bool,
     /// Threads to compute with [default: all cores]; results do not depend on it
@@ -97,7 +97,7 @@ pub struct WeightsFlag {
 pub struct ErrorFlags {
     /// Largest error of force and lambda, like 1%
     ///
-    /// What the computation may add to the force, relative to the requested force, and to lambda:
+    /// Largest error that the computation may add to the force, relative to the requested force, and to lambda:
     /// points, nodes and tolerances are chosen for it, points count by area; grids that documents or
     /// flags give are obeyed, and what they cause is reported. `lambda` and `calibrate` take 1 % for a shape
     /// whose points nobody gives.
@@ -109,7 +109,7 @@ pub struct ErrorFlags {
 }
 
 impl ErrorFlags {
-    /// What is requested, if anything is.
+    /// The requested error, if there is one.
     #[must_use]
     pub fn target(self) -> Option<ErrorTarget> {
         let refine = self.refine;
@@ -212,7 +212,7 @@ impl From<ForceFlags> for ForceOverride {
     }
 }
 
-/// What is uncertain of the display in use, in place of what its design states.
+/// Uncertainties of the display in use, in place of those that its design states.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct UncertaintyFlags {
     /// How far the magnet may be from where it is measured, along each axis, like 4mm [default: the

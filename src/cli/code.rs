@@ -121,7 +121,7 @@ impl Code {
             Self::Accuracy => (
                 "E403",
                 Some(Unmet),
-                "an accuracy asked for that was not reached",
+                "a requested accuracy that was not reached",
             ),
             Self::NoCoil => ("E404", Some(Unmet), "no coil meets the limits"),
             Self::OutputExists => ("E405", Some(Unmet), "an output exists that is not ours"),

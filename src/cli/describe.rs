@@ -204,9 +204,9 @@ pub fn given_force(headline: &Headline) -> String {
     lines.join("\n")
 }
 
-/// What the computation adds to the force, who adds it, and what would halve it.
+/// The error that the computation adds to the force, its parts, and how to halve it.
 pub fn force_error(headline: &Headline) -> String {
-    // What is below a hundredth of the whole is not read.
+    // Parts below a hundredth of the whole are left out.
     let counts = |part: &&BudgetPart| part.error > 0.01 * headline.force_error;
     let parts: Vec<String> = headline
         .budget
@@ -260,7 +260,7 @@ pub fn felt_parts(felt: &FeltForce) -> String {
     parts.join("; ")
 }
 
-/// What uncertainties cost, which to halve first, and the setting chosen for them.
+/// The cost of the uncertainties, the one to halve first, and the setting chosen for them.
 pub fn uncertainty(of: &Study) -> String {
     let one = |name: &str, error: &CurrentsError| {
         let (promised, realised) = (&error.promised, &error.realised);
@@ -303,7 +303,7 @@ fn bound(cause: Cause, value: f64) -> String {
     }
 }
 
-/// What a requested error came to; `None` where none was requested.
+/// The outcome of a requested error; `None` where none was requested.
 pub fn requested_error(headline: &Headline) -> Option<String> {
     let requested = headline.requested.as_ref()?;
     let grid = |points: &[usize]| {

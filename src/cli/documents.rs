@@ -81,7 +81,7 @@ fn taken(document: &DesignDocument, warnings: &Faults, printer: &Printer) -> Res
     Err(Failure::Documents(vec![InvalidDocument { faults }]))
 }
 
-/// What a file is, as far as its name and its first keys say.
+/// The kind of a file, judged by its name and its first keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileKind {
     Design,

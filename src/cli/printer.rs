@@ -131,7 +131,7 @@ impl Printer {
         }
     }
 
-    /// What was printed, where that is captured.
+    /// The printed text, where it is captured.
     #[must_use]
     pub fn captured(self) -> Captured {
         self.captured

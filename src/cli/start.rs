@@ -37,7 +37,7 @@ pub fn accuracy_check(missed: &[String]) -> Result<(), Failure> {
     Err(Failure::Unmet(
         Wish::Accuracy,
         format!(
-            "the accuracy asked for with --tolerance was not reached by {}; the result itself is given",
+            "the accuracy requested with --tolerance was not reached by {}; the result itself is given",
             missed.join("; ")
         ),
     ))

@@ -44,7 +44,7 @@ pub struct Drive {
     root_ohm: Vec<f64>,
     /// Largest current that the voltage holds up, A.
     most_a: Vec<f64>,
-    /// s, one a mode.
+    /// s, one per mode.
     time_constant_s: Vec<f64>,
     /// `[mode][coil]`.
     modes: Vec<f64>,

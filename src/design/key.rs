@@ -106,7 +106,7 @@ impl Key {
         }
     }
 
-    /// What may be written, its range and its meaning, on one line without marks.
+    /// Accepted values, range and meaning on one line without marks.
     #[must_use]
     pub fn remark(&self) -> String {
         let range = match self.accepts.range.as_str() {

@@ -34,7 +34,7 @@ pub struct Design {
     pub supply: Supply,
     /// How the coils lose heat.
     pub cooling: Cooling,
-    /// What is not exactly known of the display in use.
+    /// Uncertainties of the display in use.
     pub uncertainty: Uncertainty,
     /// Limits that `evaluate` and `optimize` check.
     pub limits: Limits,
@@ -42,7 +42,7 @@ pub struct Design {
     pub target_height_m: f64,
     /// Grid on which maps are tabulated.
     pub workspace: Workspace,
-    /// What `optimize --for` may vary.
+    /// Variables of `optimize --for`.
     pub search: SearchSpace,
     /// The keys that decide numbers of the command that reads the design and have their defaults,
     /// because they were not written.
@@ -216,7 +216,7 @@ pub struct Supply {
     pub total_current_max_a: Option<f64>,
     /// Supply voltage, V.
     pub voltage_v: Option<f64>,
-    /// What the drivers set.
+    /// The quantity that the drivers set.
     pub driver: Driver,
     /// Bandwidth of drivers that set currents, Hz.
     pub bandwidth_hz: f64,
@@ -225,7 +225,7 @@ pub struct Supply {
 /// Bandwidth of drivers that set currents where none is given, Hz: an ordinary servo amplifier's.
 pub const BANDWIDTH_HZ: f64 = 1000.0;
 
-/// What drivers set.
+/// The quantity that drivers set.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, EnumMessage, EnumString, IntoStaticStr, VariantArray,
 )]

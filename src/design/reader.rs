@@ -1,6 +1,6 @@
 //! Typed reading of a TOML document that collects every fault instead of stopping at the first.
 //!
-//! A section knows the keys it was asked for; [`Section::finish`] refuses all others. So a key
+//! A section knows the keys it was queried for; [`Section::finish`] refuses all others. So a key
 //! is declared where it is read, on one line, and nowhere else.
 //!
 //! A number at fault is reported once and then reads as NaN, which satisfies no comparison: the
@@ -317,7 +317,7 @@ impl<'a> Section<'a> {
         self.known.extend(keys);
     }
 
-    /// Refuses the keys that were never asked for.
+    /// Refuses the keys that were never queried.
     pub fn finish(self) {
         let Some(table) = self.table else { return };
         for key in table.keys() {

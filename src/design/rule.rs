@@ -13,7 +13,7 @@ pub enum Bound {
     Any,
     /// Greater than 0.
     Positive,
-    /// Greater than 0 and only compared with: as large or small as is wished.
+    /// Greater than 0 and only compared with: of any size.
     Limit,
     /// 0 or greater.
     NotNegative,

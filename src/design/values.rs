@@ -40,7 +40,7 @@ impl<'a> Section<'a> {
         Some(located(value, found))
     }
 
-    /// The number of a key that is no key of the document, but which somebody may write; NaN where
+    /// The number of a key that is not a key of the document, but which somebody may write; NaN where
     /// it holds something else.
     pub(super) fn unlisted(&mut self, key: &'static str) -> Option<f64> {
         self.has(key).then(|| {

@@ -142,7 +142,7 @@ impl Allocator {
     }
 
     /// Writes the currents (A) of least power whose force is `wanted_n`, or the nearest within the
-    /// limits, for the forces per ampere given (N/A, finite). What is no number is beyond reach, and
+    /// limits, for the forces per ampere given (N/A, finite). What is not a number is beyond reach, and
     /// no current flows.
     ///
     /// Error: the force is met and the sum kept within 1e-14 of the sums of their terms' sizes;
@@ -370,7 +370,7 @@ impl Allocator {
     }
 
     /// The multipliers with both the force and the sum met; the force is within reach and its
-    /// currents of least power exceed the sum. Besides, the larger relative residual.
+    /// currents of least power exceed the sum. Also the larger relative residual.
     fn with_sum(&mut self, target: f64, currents: &mut [f64]) -> (Multipliers, f64) {
         let stiffness: f64 = self.conductance_s.iter().sum();
         let (mut low, mut high) = (0.0, f64::INFINITY);

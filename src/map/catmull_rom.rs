@@ -17,7 +17,7 @@ pub struct Stencil {
     pub start: usize,
     /// Weights of the value.
     pub values: [f64; 4],
-    /// Weights of the derivative, one a step.
+    /// Weights of the derivative, one per step.
     pub slopes: [f64; 4],
 }
 

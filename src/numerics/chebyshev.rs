@@ -115,7 +115,7 @@ pub struct Evaluation<'a> {
     pub table: &'a Table,
     /// Points, ascending, within the table's interval.
     pub points: &'a [f64],
-    /// Values, one a point.
+    /// Values, one per point.
     pub out: &'a mut [f64],
 }
 

@@ -205,7 +205,7 @@ impl<'a> ShapeField<'a> {
         })
     }
 
-    /// What `compute` gives at points of the shape, by its name.
+    /// The cached result of `compute` at points of the shape, by its name.
     fn at_points<T: Serialize + DeserializeOwned>(
         self,
         what: &str,

@@ -206,7 +206,7 @@ impl MapTask<'_> {
     }
 }
 
-/// What is computed for a map of these components: the force on a tilted magnet needs the whole gradient.
+/// Components that kernels compute for a map: the force on a tilted magnet needs the whole gradient.
 fn of_kernels(scene: &Scene, components: Components) -> Components {
     match components {
         Components::Force if scene.tilted() => Components::Gradient,

@@ -77,20 +77,20 @@ impl ErrorTarget {
         )
     }
 
-    /// What the number of points may add, `for_runtime` or for lambda alone.
+    /// Error that the number of points may add, `for_runtime` or for lambda alone.
     #[must_use]
     pub fn of_points(self, for_runtime: bool) -> f64 {
         let [with, without] = Self::OF_POINTS;
         self.error * if for_runtime { with } else { without }
     }
 
-    /// What heights between the points may add.
+    /// Error that heights between the points may add.
     #[must_use]
     pub fn between_points(self) -> f64 {
         Self::BETWEEN_POINTS * self.error
     }
 
-    /// What interpolation of the map may add.
+    /// Error that interpolation of the map may add.
     #[must_use]
     pub fn of_interpolation(self) -> f64 {
         Self::OF_INTERPOLATION * self.error

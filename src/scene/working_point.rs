@@ -237,7 +237,7 @@ impl WorkingPoint {
         self.total(scene, grid, Components::All, &pick, progress)
     }
 
-    /// What `pick` takes of the maps of the windings, at their currents, and of the steel.
+    /// The sum of what `pick` takes of the maps of the windings, at their currents, and of the steel.
     fn total(
         &self,
         scene: &Scene,

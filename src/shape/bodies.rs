@@ -13,7 +13,7 @@ pub struct BodyOptions {
 }
 
 impl BodyOptions {
-    /// Whether nothing was asked for.
+    /// Whether nothing was requested.
     #[must_use]
     pub fn is_default(&self) -> bool {
         *self == Self::default()

@@ -97,7 +97,7 @@ pub fn stated_tessellation(facts: &MeshFacts) -> Option<StageAccuracy> {
 pub struct Certificate {
     /// The vertical difference over the cells of four points.
     pub vertical: Vertical,
-    /// The Hausdorff distance over the same cells; `None` where it was not asked for, for a
+    /// The Hausdorff distance over the same cells; `None` where it was not requested, for a
     /// formula, and without a cell.
     pub hausdorff: Option<Interval>,
     /// The facets' deviation from the surface meant, m; 0 for a formula.
@@ -139,7 +139,7 @@ impl Certificate {
     }
 }
 
-/// Compares the points with the surface they were taken from; `None` where that was not asked for,
+/// Compares the points with the surface they were taken from; `None` where that was not requested,
 /// or what one core looks at in `seconds` is spent.
 ///
 /// # Errors

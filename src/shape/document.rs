@@ -179,7 +179,7 @@ impl Up {
     }
 }
 
-/// Which grid of points is asked for.
+/// Which grid of points is requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridRequest {
     /// Extent and samples along x; `None` extent: the surface's own.

@@ -29,7 +29,7 @@ pub enum SurfaceFormat {
     Sldprt,
 }
 
-/// What is known of a format without its reader.
+/// Facts about a format that need no reader.
 struct Row {
     format: SurfaceFormat,
     /// Its usual name.

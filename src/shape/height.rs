@@ -214,7 +214,7 @@ impl Touch {
         }
     }
 
-    /// What counts at a point: what covers it, unless nothing does or a wall is there.
+    /// The hit that counts at a point: the covering one, unless nothing covers it or a wall is there.
     fn or_covered(self, triangles: &[Triangle], covering: Hit) -> Hit {
         if self.wall || covering.height == f64::NEG_INFINITY {
             higher(triangles, covering, self.hit)
@@ -224,7 +224,7 @@ impl Touch {
     }
 }
 
-/// What a contact is to a point.
+/// How a contact meets a point.
 enum Meeting {
     None,
     Covers(Hit),

@@ -71,7 +71,7 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         samples: if to > from { CELLS } else { 1 },
     });
     let grid = Grid { x_m, y_m };
-    // Heights alone are asked for: of layers nothing.
+    // Heights alone are requested: of layers nothing.
     let rules = Rules {
         reach_m: reach_m(mesh, &grid),
         plain_layers: 1,
@@ -135,7 +135,7 @@ fn is_covered(
     rules: Rules,
 ) -> bool {
     let (p, seen_m) = ([point[0], point[1]], point[2] + depth_m);
-    // What does not reach over the point does not cover it; its own facet is met in any case.
+    // A facet that does not reach over the point does not cover it; the point's own facet is met in any case.
     let rises = |at: &u32| {
         let at = *at as usize;
         at == facet || may_cover(&triangles[at], p, seen_m, 2.0 * rules.reach_m)

@@ -40,7 +40,7 @@ const STRIDE: usize = 1024;
 /// A side of a cell, from a node to the next along x (`false`) or y (`true`).
 type Side = (usize, bool);
 
-/// What there is over a place: its height, m.
+/// Height of the surface over a place, m.
 pub type HeightAt<'a> = &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync);
 
 /// Cells of a grid whose corners describe the surface badly, sampled on finer places; columns of equal
@@ -145,7 +145,7 @@ impl FineCells {
             coarse
         };
         let scale = total / area(&coarse);
-        // What both rules share is one sample.
+        // A part that both rules share is one sample.
         let shared = |part: &Part| coarse.iter().any(|other| other == part);
         let rules = fine.iter().map(|part| {
             let of_coarse = if shared(part) {
@@ -258,7 +258,7 @@ impl Quarters<'_> {
         Leaf::IsNot
     }
 
-    /// What of a part has surface, with its middle; `None` without any.
+    /// The piece of a part that has surface, with its middle; `None` without any.
     fn part(&self, corners: [Node; 4], heights_m: [Option<f64>; 4]) -> Option<Part> {
         let corners = corners.map(|corner| self.place(corner));
         let mut outline = Vec::with_capacity(8);
@@ -340,7 +340,7 @@ fn covered_part(
     if low == 0.0 { 0.0 } else { 0.5 * (low + high) }
 }
 
-/// What each cell of a grid gives its corners.
+/// The share of each cell of a grid that its corners get.
 struct Shares<'a> {
     grid: &'a Grid,
     present: Vec<bool>,

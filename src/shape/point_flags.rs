@@ -86,7 +86,7 @@ pub(super) fn at(
     Some((sample, of_contacts(triangles, &contacts, p, &sample, rules)))
 }
 
-/// What [`at`] gives, without the marks.
+/// As [`at`], without the flags.
 pub(super) fn sample_at(
     triangles: &[Triangle],
     touching: &[u32],

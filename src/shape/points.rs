@@ -133,9 +133,9 @@ pub struct Discretized {
     pub read_by: Option<String>,
     /// The stage's error, absolute, m.
     pub accuracy: StageAccuracy,
-    /// How far the interpolated points may lie from the surface, where it was asked for.
+    /// How far the interpolated points may lie from the surface, where it was requested.
     pub certificate: Option<Certificate>,
-    /// A bound of the vertical difference for every cell, m, where it was asked for; `None` where
+    /// A bound of the vertical difference for every cell, m, where it was requested; `None` where
     /// a corner has no surface.
     pub cells_m: Option<Vec<Option<f64>>>,
     /// How much of the surface a height map cannot show; `None` for a formula and where points are
@@ -152,7 +152,7 @@ pub struct Settings {
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
-    /// What that may take, s of one core about; counted, so that every machine stops at the same place.
+    /// Time that it may take, s of one core about; counted, so that every machine stops at the same place.
     pub certify_seconds: u64,
     /// Result of an earlier comparison of these points with this surface; it is not repeated.
     pub known: Option<Certificate>,
@@ -207,7 +207,7 @@ pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid,
     Ok(grid)
 }
 
-/// [`discretize`] with holes, marks and a certificate as asked for.
+/// [`discretize`] with holes, marks and a certificate as requested.
 ///
 /// # Errors
 /// As [`discretize`]; [`ShapeError::Document`] for holes where they are refused.

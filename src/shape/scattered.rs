@@ -123,7 +123,7 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// What [`Self::at`] gives, without the marks.
+    /// As [`Self::at`], without the flags.
     #[must_use]
     pub fn sample(&self, p: [f64; 2]) -> Option<Sample> {
         match &self.kind {

@@ -299,7 +299,7 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         },
         NamedFileError::Folder => "this is a folder; name the surface file in it".into(),
         NamedFileError::NotRegular => {
-            "this is no regular file (a device, a pipe or a socket)".into()
+            "this is not a regular file (a device, a pipe or a socket)".into()
         }
         NamedFileError::TooLarge(_) => {
             format!("the file is larger than {LARGEST_FILE} bytes; export it coarser")

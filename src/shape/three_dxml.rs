@@ -26,7 +26,7 @@ pub(crate) fn begins(bytes: &[u8]) -> bool {
 /// [`ReadError`] with part and line.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     if !Archive::is(bytes) {
-        let what = "this 3DXML file is no ZIP archive; only zipped ones are read: save it again \
+        let what = "this 3DXML file is not a ZIP archive; only zipped ones are read: save it again \
                     from the CAD program, or export the body as 3MF or STL";
         return Err(ReadError::file(what));
     }
@@ -268,7 +268,7 @@ fn positions(text: &str, numbers: &mut Numbers) -> Result<Vec<[f64; 3]>, String>
     if rest.is_empty() {
         Ok(points.to_vec())
     } else {
-        Err(format!("{} numbers are no list of points", values.len()))
+        Err(format!("{} numbers are not a list of points", values.len()))
     }
 }
 
@@ -290,7 +290,7 @@ fn face(e: &Element<'_>, rep: &mut Rep) -> Result<(), String> {
     if let Some(text) = e.get_exact("triangles") {
         let all = indices(&text)?;
         if all.len() % 3 != 0 {
-            return Err(format!("{} indices are no list of triangles", all.len()));
+            return Err(format!("{} indices are not a list of triangles", all.len()));
         }
         rep.corners.extend(all);
     }

@@ -39,7 +39,7 @@ pub(crate) fn begins(bytes: &[u8]) -> bool {
 /// [`ReadError`] with part and line.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     if !Archive::is(bytes) {
-        let what = "this is not a 3MF file: it is no ZIP archive; export it again";
+        let what = "this is not a 3MF file: it is not a ZIP archive; export it again";
         return Err(ReadError::file(what));
     }
     let mut archive = Archive::open(bytes)?;

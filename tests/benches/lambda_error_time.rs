@@ -157,7 +157,7 @@ fn measure(name: &str, case: &Case) -> Result<Value, Failure> {
             ..settings
         };
         let solution = lambda::solve(&problem, &settings)?;
-        let point = solution.at.ok_or("no point at the lambda asked for")?;
+        let point = solution.at.ok_or("no point at the requested lambda")?;
         least.push(solution.path.error_n2(at));
         gaps.push(point.duality_gap_n2 / solution.path.error_n2(at));
     }

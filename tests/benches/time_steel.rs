@@ -1,4 +1,4 @@
-//! Time, unknowns and estimated error of the steel's solutions against the tolerance asked for.
+//! Time, unknowns and estimated error of the steel's solutions against the requested tolerance.
 //!
 //! ```text
 //! cargo bench --locked --bench time_steel -- [DESIGN]

@@ -104,7 +104,7 @@ fn single_files_are_whole_or_absent() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("points.json tells what it was made from"),
+        error.contains("points.json states what it was made from"),
         "{error}"
     );
     let sidecar = json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",

@@ -140,7 +140,7 @@ fn stops(place: &Place, args: &[&str], after_ms: &[u64]) {
             "{args:?} after {after} ms: {answer:?}"
         );
         if code == Some(0) {
-            // It was quicker than the signal, and wrote what it was asked for.
+            // It was quicker than the signal, and wrote what it was requested.
             if let Some(out) = &out {
                 let remove = if out.is_dir() {
                     remove_dir_all

@@ -114,12 +114,12 @@ fn six_ampere_magnet_and_pull_are_those_of_finite_elements() {
         "model = \"cylinder\"\npassive_force = true",
     );
     let with = evaluated(&seed(&[ALONE, pulled]));
-    let pull_n = with.target.passive_force_n.expect("asked for");
+    let pull_n = with.target.passive_force_n.expect("requested");
     near(pull_n, -0.0272, 3e-3);
     near(with.target.force_n, whole.target.force_n + pull_n, 1e-12);
     let higher = seed(&[ALONE, pulled, ("height_mm = 30.0", "height_mm = 50.0")]);
     let higher = evaluated(&higher).target.passive_force_n;
-    near(higher.expect("asked for"), -0.0024, 0.02);
+    near(higher.expect("requested"), -0.0024, 0.02);
 }
 
 #[test]

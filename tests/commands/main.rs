@@ -100,7 +100,7 @@ fn the_jnd_is_what_the_limits_may_add_to_the_error() {
     let (_, report) = solved.expect("solves");
     let file = &report.file;
     assert!(at < file.constants.lambda_linear_n_per_m.expect("linear"));
-    let floor = file.at.as_ref().expect("asked for").rms_error_n / (at * 0.05);
+    let floor = file.at.as_ref().expect("requested").rms_error_n / (at * 0.05);
     let chosen = file.relative_rms_error.expect("a force constant");
     let added = chosen * chosen - floor * floor;
     assert!((added - 0.07 * 0.07).abs() < 1e-12, "{added:e}");
@@ -275,7 +275,11 @@ fn small_shape(folder: &Path) -> String {
 #[allow(clippy::disallowed_methods)]
 fn forge(folder: &Path, name: &str, bytes: &[u8]) {
     let before = std::fs::read(folder.join(name)).expect("a file of the bundle");
-    assert_eq!(before.len(), bytes.len(), "the manifest tells the size too");
+    assert_eq!(
+        before.len(),
+        bytes.len(),
+        "the manifest states the size too"
+    );
     let manifest = folder.join("manifest.json");
     let reported = std::fs::read_to_string(&manifest).expect("manifest");
     let forged = reported.replace(

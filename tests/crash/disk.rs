@@ -83,7 +83,7 @@ pub fn small_disk(prepared: &Prepared, steps: usize, random: &mut Random) -> Res
         }
         ran.ended_with(&[0, 4])?;
         if ran.code == Some(4) && !ran.err.contains("disk is full") {
-            return Err(format!("does not tell that the disk is full: {}", ran.err));
+            return Err(format!("does not state that the disk is full: {}", ran.err));
         }
         row.struck += usize::from(ran.code == Some(4));
         fs::remove_dir_all(place.path(OUT)).unwrap();
@@ -234,7 +234,7 @@ impl Somebody {
             ran.ended_with(if run == 1 { &[4] } else { &[0, 4] })?;
             if ran.code == Some(4) && !ran.err.contains("read-only or belongs to someone else") {
                 return Err(format!(
-                    "does not tell that the folder is closed: {}",
+                    "does not state that the folder is closed: {}",
                     ran.err
                 ));
             }

@@ -1,4 +1,4 @@
-//! Damaged and hostile inputs of every kind but surfaces (see `surfaces.rs`), as long as is wished.
+//! Damaged and hostile inputs of every kind but surfaces (see `surfaces.rs`), as long as requested.
 //!
 //! ```text
 //! cargo bench --locked --bench fuzz_inputs -- [--seconds 60] [--kind bundle] [--seed 1]

@@ -1,4 +1,4 @@
-//! Damaged and hostile surface files for every reader, for as long as is wished.
+//! Damaged and hostile surface files for every reader, for as long as requested.
 //!
 //! ```text
 //! cargo bench --locked --bench fuzz_surfaces -- [--seconds 60] [--format 3mf] [--seed 1]

@@ -58,7 +58,7 @@ fn assert_proved(case: &Case, solution: &Solution, what: &str) {
         let point = solve(&case.problem(), &settings)
             .expect("well formed")
             .at
-            .expect("asked for");
+            .expect("requested");
         let scale = lambda * lambda * case.mean_square();
         // The gap of rounded currents: their rounding's forces times what the limits allow.
         let reach: f64 = (0..m)

@@ -164,7 +164,7 @@ fn the_criterion_chooses() {
             Criterion::Maxmin => solution.constants.lambda_maxmin_n_per_m,
         };
         assert_eq!(Some(chosen.lambda_n_per_m), expected);
-        let at = solution.at.expect("asked for");
+        let at = solution.at.expect("requested");
         assert_eq!(at.lambda_n_per_m, 2.3);
         assert!((at.rms_error_n.powi(2) - solution.path.error_n2(2.3)).abs() < 1e-18);
     }

@@ -71,7 +71,7 @@ fn check(case: &Case, what: &str) -> Option<f64> {
             ..Settings::default()
         };
         let proven = solve(&case.problem(), &settings).expect("well formed").at;
-        let gap = proven.expect("asked for").duality_gap_n2;
+        let gap = proven.expect("requested").duality_gap_n2;
         assert!(gap <= 1e-8 * scale, "{what} at {lambda}: {gap}; {case:?}");
         let there = solution.path.currents_a(lambda);
         let size = currents.iter().fold(0.0_f64, |most, v| most.max(v.abs()));

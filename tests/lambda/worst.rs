@@ -392,8 +392,8 @@ fn weights_count_points_as_often_as_they_say() {
         let plain = solve(&repeated.problem(), &settings).expect("well formed");
         let scale = 1.7 * 1.7 * repeated.mean_square();
         let (a, b) = (
-            weighted.at.expect("asked for"),
-            plain.at.expect("asked for"),
+            weighted.at.expect("requested"),
+            plain.at.expect("requested"),
         );
         assert!(
             (a.rms_error_n.powi(2) - b.rms_error_n.powi(2)).abs() <= 1e-13 * scale,
@@ -538,7 +538,7 @@ fn a_twin_of_an_active_point_does_not_hide_the_one_missed_next() {
     }
 }
 
-/// Only so many twins are asked for before a step: one that is too long must be taken back. t* was
+/// Only so many twins are requested before a step: one that is too long must be taken back. t* was
 /// off by up to 3 % of lambda max h where it was not.
 #[test]
 fn more_twins_than_requested_do_not_hide_the_next_miss() {

@@ -198,7 +198,7 @@ fn the_seed_workspace_keeps_the_tolerance_with_few_samples() {
         let (map, report) = made(&source, &grid, Components::Gz, tolerance);
         assert!(
             report.certificate > 0.01 * tolerance,
-            "no more digits than asked for"
+            "no more digits than requested"
         );
         let asked = source.asked.load(Ordering::Relaxed) - before;
         let error = worst(&map, &source);

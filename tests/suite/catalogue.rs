@@ -37,7 +37,7 @@ pub struct CaseRow {
     pub expected: String,
     /// The outcome.
     pub got: String,
-    /// How far off it is, in the unit that `expected` names; null where there is no number.
+    /// How far off it is, in the unit that `expected` names; null where there is not a number.
     #[serde(serialize_with = "finite_or_null")]
     #[schemars(with = "Option<f64>")]
     pub error: f64,

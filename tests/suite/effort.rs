@@ -79,7 +79,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// The row, with its seconds. An error that is no number counts as the largest there is.
+    /// The row, with its seconds. An error that is not a number counts as the largest there is.
     #[must_use]
     pub fn timed(self, timing: &Timing) -> Row {
         let error = if self.error.is_finite() {

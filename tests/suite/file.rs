@@ -28,9 +28,9 @@ pub struct BenchFile {
     pub quick: bool,
     /// One entry a stage.
     pub stages: Vec<StageCurves>,
-    /// Time and memory against size, where asked for.
+    /// Time and memory against size, where requested.
     pub scaling: Vec<Law>,
-    /// Why peers that were asked for have no curve.
+    /// Why peers that were requested have no curve.
     pub peers_missing: Vec<String>,
     /// The error that every stage states at the default knob.
     pub accuracy: BTreeMap<String, StageAccuracy>,

@@ -100,7 +100,7 @@ impl Owned {
                 State::Foreign(Kind::Folder | Kind::Link | Kind::Special) if overwrite.forced() => {
                     return Err(WriteError::Protected {
                         path,
-                        reason: "is no regular file".to_owned(),
+                        reason: "is not a regular file".to_owned(),
                     });
                 }
                 State::Foreign(_) => {

@@ -63,7 +63,7 @@ pub(crate) fn put(
 ) -> io::Result<()> {
     let earlier = dir.status(name)?;
     if earlier.is_some_and(|there| there.kind != Kind::File) {
-        return Err(io::Error::other("what is there is no regular file"));
+        return Err(io::Error::other("what is there is not a regular file"));
     }
     let mut made = new_temporary(dir, earlier)?;
     // Small: one call at the end forces it.

@@ -188,7 +188,7 @@ impl Overwrite {
                     path: target.to_path_buf(),
                 });
             }
-            Kind::Link | Kind::Special => return protected(target, "is no regular file"),
+            Kind::Link | Kind::Special => return protected(target, "is not a regular file"),
         }
         let shown = target;
         let real = real(target).map_err(fail)?;
@@ -270,10 +270,10 @@ impl Overwrite {
     pub(super) fn record(&self, path: &Path) -> Result<Record, String> {
         let name = path.display();
         if followed(path).map_or(true, |there| there.is_none()) {
-            return Err(format!("and no {name} tells what it was made from"));
+            return Err(format!("and no {name} states what it was made from"));
         }
         let Some(record) = Record::read(path) else {
-            return Err(format!("and {name} does not tell what it was made from"));
+            return Err(format!("and {name} does not state what it was made from"));
         };
         let state = record.state();
         if state == State::Changed {

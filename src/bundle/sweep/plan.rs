@@ -28,7 +28,7 @@ pub enum Mode {
     OptimizeFor,
 }
 
-/// What an array is searched for.
+/// The objective of a search of whole arrays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArrayTask {
@@ -172,7 +172,7 @@ impl PlanFile {
         Ok(plan)
     }
 
-    /// The values of point `index`, one an axis.
+    /// The values of point `index`, one per axis.
     #[must_use]
     pub fn values_at(&self, index: u64) -> Vec<&Value> {
         let mut rest = index;

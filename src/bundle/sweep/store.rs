@@ -124,7 +124,7 @@ impl PointStore {
             Some(point) if point.fluxform_version != FLUXFORM_VERSION => StoredPoint::Nothing,
             Some(point) => StoredPoint::Point(Box::new(point)),
             None if PointFile::is_torn(&bytes) => StoredPoint::Nothing,
-            None => StoredPoint::Foreign("and is no point of a sweep".to_owned()),
+            None => StoredPoint::Foreign("and is not a point of a sweep".to_owned()),
         })
     }
 
@@ -168,7 +168,7 @@ impl PointStore {
                 }
             }
             Some(Kind::Folder | Kind::Link | Kind::Special) => {
-                let reason = "is no regular file".to_owned();
+                let reason = "is not a regular file".to_owned();
                 return Err(WriteError::Protected { path, reason });
             }
         }

@@ -83,7 +83,7 @@ impl Physical {
 pub enum Objective {
     /// The smallest.
     Smallest,
-    /// The geometric mean with these weights, one a shape.
+    /// The geometric mean with these weights, one per shape.
     Mean(Vec<f64>),
 }
 

@@ -61,7 +61,7 @@ pub struct Task {
 }
 
 impl Task {
-    /// What limits the outer diameter, and the limit, m: of array and limits the tighter one.
+    /// The bound on the outer diameter, m, and its name: the tighter one of array and limits.
     #[must_use]
     pub fn outer_max(&self) -> Option<(LimitName, f64)> {
         let limit = self.limits.outer_diameter_max_m;

@@ -9,7 +9,7 @@ use crate::scene::sources::ShapeSource;
 use crate::shape::document::AxisRequest;
 use crate::shape::points::ConstraintPoints;
 
-/// Shares of the present number of intervals; the last ones are finer than asked for now.
+/// Shares of the present number of intervals; the last ones are finer than requested now.
 const FACTORS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// How many of them are of maps, whose nodes grow with the third power.
 const OF_MAPS: usize = 5;
@@ -17,7 +17,7 @@ const OF_MAPS: usize = 5;
 const QUICK: usize = 4;
 /// Shares of points from which on they are the first to be dropped.
 const MANY: f64 = 10.0;
-/// How much coarser than asked for now deviations are.
+/// How much coarser than requested now deviations are.
 const DEVIATIONS: [f64; 5] = [16.0, 8.0, 4.0, 2.0, 1.0];
 /// Fewest samples along an axis: the map's interpolation takes four nodes.
 const FEWEST: usize = 4;

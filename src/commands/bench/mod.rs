@@ -46,7 +46,7 @@ pub struct BenchRequest<'a> {
     pub inputs: Vec<Input>,
     /// The objects.
     pub shapes: &'a [ShapeSource],
-    /// Criterion, and the tolerance that is asked for now.
+    /// Criterion, and the tolerance that is requested now.
     pub lambda: LambdaOptions,
     /// Sweep a graded deviation from this one, m, instead of the grid of points.
     pub max_deviation_m: Option<f64>,

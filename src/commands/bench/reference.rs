@@ -23,7 +23,7 @@ use crate::shape::height::Grid as Plan;
 const AIR: f64 = 1e-15;
 /// The refined field's tolerance over steel against the tightest of the ladder.
 const STEEL: f64 = 0.1;
-/// The tightest that steel is asked for.
+/// The tightest tolerance requested of steel.
 const TIGHTEST_STEEL: f64 = 1e-9;
 /// Places compared along x and y. With these margins, parts of the plan's width that no grid of equal
 /// steps has, none of them is a node of the map or a point.

@@ -107,7 +107,7 @@ impl Calibration<'_> {
         effect.nodes(target.of_interpolation(), progress).map(Some)
     }
 
-    /// What a runtime adds to the error of lambda: heights and forces between points and nodes.
+    /// Adds the runtime's part of the error: heights and forces between points and nodes.
     pub(super) fn add_to_headline(
         &self,
         lambda: &mut LambdaReport,

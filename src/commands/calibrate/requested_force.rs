@@ -6,7 +6,7 @@ use crate::force_direction::RequestedForce;
 use crate::lambda::sideways::SIDEWAYS_WEIGHT;
 use crate::shape::points::ConstraintPoints;
 
-/// What a bundle states of the request; `None` where the upward component alone is requested.
+/// The request as a bundle states it; `None` where the upward component alone is requested.
 pub(super) fn summary(force: RequestedForce, points: &ConstraintPoints) -> Option<ForceSummary> {
     if !force.direction.is_vector() {
         return None;

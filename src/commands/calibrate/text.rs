@@ -100,7 +100,7 @@ fn force_rows(file: &LambdaFile) -> Vec<Vec<(&'static str, String)>> {
     rows.into_iter().flatten().map(ForceRow::cells).collect()
 }
 
-/// What one way of driving the coils gives of the requested force.
+/// The part of the requested force that one way of driving the coils gives.
 #[derive(Default)]
 struct ForceRow {
     shape: String,
@@ -135,7 +135,7 @@ impl ForceRow {
     }
 }
 
-/// What the table of forces leaves open: saturation, what the computation adds, what is uncertain.
+/// Lines below the table of forces: saturation, the error of the computation, uncertainties.
 fn force_lines(sheet: &mut Sheet, report: &CalibrateReport) {
     sheet.line(
         "force",
@@ -209,7 +209,7 @@ fn of_shapes(
     }
 }
 
-/// What the bundles do without: a line for every thing, with its reason where that is the same of all
+/// Parts that the bundles leave out: a line for each, with its reason where that is the same of all
 /// shapes that do without it.
 fn left_out(report: &CalibrateReport) -> String {
     let mut things: BTreeMap<&str, Vec<(&str, &LeftOut)>> = BTreeMap::new();

@@ -79,7 +79,7 @@ pub struct CompareReport {
     pub pairs: Vec<Pair>,
     /// Errors of the forces and of the differences.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// Where every two differ, if that was asked for.
+    /// Where every two differ, if that was requested.
     #[serde(skip)]
     pub maps: Vec<Slice>,
     /// Warnings for the user.
@@ -272,7 +272,7 @@ pub fn run(
     })
 }
 
-/// What there is to say of the steel.
+/// Remarks on the steel.
 fn of_steel(scene: &Scene) -> Vec<String> {
     let Some(core) = &scene.core else {
         return Vec::new();

@@ -113,7 +113,7 @@ pub struct PointsSummary {
     /// How far the interpolated points may lie from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<DeviationSummary>,
-    /// What became of a requested error; absent without one.
+    /// The outcome of a requested error; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub requested: Option<RequestedHeights>,
     /// Each part of the heights' error: `points` (rounding), `grid`, `tessellation`.
@@ -213,7 +213,7 @@ pub struct PointsOptions {
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
-    /// What that may take, s of one core about.
+    /// Time that the certificate may take, s of one core about.
     pub certify_seconds: u64,
     /// Whether a picture will be drawn.
     pub picture: bool,
@@ -337,7 +337,7 @@ impl PointsReport {
     }
 }
 
-/// What became of a requested error.
+/// The outcome of a requested error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RequestedHeights {
     /// Requested of heights between the points, relative to the lowest height that is rendered.
@@ -421,7 +421,7 @@ impl OpenedSurface {
         Ok(report)
     }
 
-    /// What heights between the points of `document` add, as [`between_points`] of its grid states it; `None` where
+    /// The error of heights between the points of `document`, as [`between_points`] of its grid states it; `None` where
     /// no force is requested. Where the surface jumps no certificate decides it, and none is computed.
     ///
     /// # Errors

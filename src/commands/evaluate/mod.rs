@@ -71,11 +71,11 @@ pub struct Transient {
     /// Under a current loop: time until the force follows a current that is there at once, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub eddies_95_s: Option<f64>,
-    /// What takes most of it.
+    /// The largest contribution.
     pub limited_by: LimitedBy,
 }
 
-/// What limits the speed of a force.
+/// The cause that limits the speed of a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitedBy {

@@ -33,7 +33,7 @@ use crate::cli::values::{self, FileArgument, setting};
      "with another pitch, which the workspace follows, and other drivers"),
 ]))]
 pub struct Init {
-    /// What to begin with [default: asked at a terminal, else seed]
+    /// Design to begin with [default: prompted for at a terminal, else seed]
     #[arg(value_name = "TEMPLATE", value_parser = values::named::<Start>())]
     template: Option<Start>,
     /// The object
@@ -119,7 +119,7 @@ impl Init {
         }
     }
 
-    /// What is not given is asked; an empty answer takes what is in brackets.
+    /// Prompts for missing values; an empty answer takes the one in brackets.
     fn asked(&self) -> Result<Request, Failure> {
         let starts: Vec<String> = Start::ALL
             .iter()

@@ -102,7 +102,7 @@ impl Object {
     }
 }
 
-/// What to begin with.
+/// The files that are written at first.
 #[derive(Debug, Clone)]
 pub struct Request {
     /// The design that is changed.

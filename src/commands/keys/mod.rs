@@ -50,7 +50,7 @@ pub struct KeyEntry {
     pub section: String,
     /// Its name.
     pub key: &'static str,
-    /// What may be written, in words.
+    /// Accepted values, in words.
     pub value: String,
     /// Unit of its numbers; `None` where they have none.
     pub unit: Option<&'static str>,
@@ -60,7 +60,7 @@ pub struct KeyEntry {
     pub required: bool,
     /// Its value where it is not given; `None` where there is none.
     pub default: Option<toml::Value>,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
     /// Value, range and meaning on one line.
     #[serde(skip)]

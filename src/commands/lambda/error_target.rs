@@ -35,7 +35,7 @@ pub(crate) struct ChosenGrid {
     order: f64,
 }
 
-/// What points are tried on.
+/// The problem on which numbers of points are tried.
 #[derive(Clone, Copy)]
 pub(crate) struct Trial<'a> {
     pub(crate) scene: &'a Scene<'a>,
@@ -138,7 +138,7 @@ impl Trial<'_> {
         let at = ForcesAt {
             scene,
             solved: self.solved,
-            // What is computed for a trial is of no use to later runs.
+            // Later runs have no use for the field of a trial.
             field: ShapeField::default(),
             progress,
         };

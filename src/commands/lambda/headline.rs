@@ -1,4 +1,4 @@
-//! What lambda comes to: its error, from what the stages state.
+//! The headline of lambda: its error, from the errors that the stages state.
 
 use super::PosedProblem;
 use crate::RunError;
@@ -34,7 +34,7 @@ impl Amplification {
 }
 
 impl PosedProblem<'_> {
-    /// What the result in `file` comes to, as far as it does not depend on a map; `None` without a
+    /// The headline of the result in `file`, as far as it does not depend on a map; `None` without a
     /// lambda above zero. Of errors relative to the largest gradient, also how they count.
     ///
     /// # Errors

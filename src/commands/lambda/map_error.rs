@@ -1,4 +1,4 @@
-//! What a runtime adds to the force beside lambda's own error: heights between the points, nodes of
+//! The runtime's error of the force beside lambda's own: heights between the points, nodes of
 //! the map, and interpolation between them.
 
 use crate::RunError;

@@ -83,11 +83,11 @@ pub struct LambdaOptions {
     pub feedback: Option<FeedbackOptions>,
     /// Whether the data of a picture are computed.
     pub picture: bool,
-    /// What takes the place of the requested force that the shape states.
+    /// Overrides of the requested force that the shape states.
     pub force: ForceOverride,
-    /// What takes the place of the just-noticeable angle that the shape states, degrees.
+    /// Override of the just-noticeable angle that the shape states, degrees.
     pub direction_jnd_deg: Option<f64>,
-    /// What takes the place of the design's uncertainties.
+    /// Overrides of the design's uncertainties.
     pub uncertainty: UncertaintyOverride,
 }
 

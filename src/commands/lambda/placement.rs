@@ -105,7 +105,7 @@ impl Placed<'_> {
         [space.x_m, space.y_m, space.z_m]
     }
 
-    /// What brings the object into the workspace.
+    /// The shift that brings the object into the workspace, in words.
     fn cure(&self) -> String {
         let axes = self.axes();
         let ends = [0, 1, 2].map(|k| {

@@ -64,7 +64,7 @@ pub(super) struct GridPlaces {
     pub(super) index: Vec<usize>,
 }
 
-/// What forces at further places are computed with.
+/// The scene and solution with which forces at further places are computed.
 #[derive(Clone, Copy)]
 pub(crate) struct ForcesAt<'a> {
     pub(crate) scene: &'a Scene<'a>,

@@ -97,7 +97,7 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     sheet.finish()
 }
 
-/// What the force comes to at the finger, and what was requested of its error.
+/// The force at the finger, and the outcome of a requested error.
 fn headline_lines<'a>(sheet: &mut Sheet, file: &'a LambdaFile) -> Option<&'a FeltForce> {
     let headline = file.headline.as_ref()?;
     if let Some(requested) = describe::requested_error(headline) {

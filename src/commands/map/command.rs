@@ -57,7 +57,7 @@ pub struct Map {
     #[arg(long, default_value = Components::default().name(), value_parser = values::named::<Components>())]
     components: Components,
     /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or
-    /// one a coil [default: the rated currents]
+    /// one per coil [default: the rated currents]
     #[arg(
         long,
         hide_short_help = true,
@@ -134,7 +134,7 @@ impl Map {
             [all] => Ok(Some(vec![*all; coils])),
             each if each.len() == coils => Ok(Some(each.to_vec())),
             each => fault(format!(
-                "{} values for {coils} coils; give one for all, or one a coil",
+                "{} values for {coils} coils; give one for all, or one per coil",
                 each.len()
             )),
         }

@@ -48,7 +48,7 @@ pub struct MapRequest {
     pub tolerance: Option<f64>,
     /// The largest error of the map, at and between its nodes, which are as few as hold it.
     pub error: Option<ErrorTarget>,
-    /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
+    /// Currents of the working point, A, one per coil; `None` for the rated ones. Without a B-H
     /// curve there is no working point.
     pub currents_a: Option<Vec<f64>>,
     /// Folder of the files.
@@ -129,7 +129,7 @@ pub struct MapReport {
     /// The compact form of a coupled array's steel, where there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<CompactSteel>,
-    /// What became of a requested error; absent without one.
+    /// The outcome of a requested error; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub requested: Option<RequestedMap>,
     /// The field on nodes for mag_manip, where requested.
@@ -458,7 +458,7 @@ impl Together {
     }
 }
 
-/// What became of a requested error.
+/// The outcome of a requested error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RequestedMap {
     /// Requested of the map, at and between its nodes, relative to the largest |dB_z/dz| at the height.

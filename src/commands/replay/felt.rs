@@ -25,7 +25,7 @@ pub struct FeltErrors {
 /// The felt error with currents of least power and with those chosen for the uncertainties.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FeltSummary {
-    /// What is uncertain; a tilt is not: a bundle holds no force on a tilted magnet.
+    /// The uncertainties without a tilt: a bundle holds no force on a tilted magnet.
     pub given: Uncertainty,
     /// Random displays.
     pub draws: usize,

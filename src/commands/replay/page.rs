@@ -71,7 +71,7 @@ fn every(positions: usize) -> usize {
     positions.div_ceil(MOST).max(1)
 }
 
-/// What the script draws; mm, mN, A and s.
+/// The values that the script draws; mm, mN, A and s.
 fn moments(report: &ReplayReport, below: &Below, every: usize) -> Value {
     let rows = &report.rows;
     let coil = |coil: usize| {

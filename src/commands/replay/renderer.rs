@@ -62,7 +62,7 @@ impl Limits {
     }
 }
 
-/// What two fingers need.
+/// Data for two fingers.
 #[derive(Debug, Clone)]
 struct PairPart {
     moment_a_m2: [f64; 3],
@@ -71,7 +71,7 @@ struct PairPart {
     axes_n_per_a: [[Vec<f64>; 3]; 2],
 }
 
-/// What currents chosen for the uncertainties need.
+/// Data for currents chosen for the uncertainties.
 #[derive(Debug, Clone)]
 struct RobustPart {
     form: RobustForm,
@@ -83,7 +83,7 @@ struct RobustPart {
     plain_a: Vec<f64>,
 }
 
-/// What three rows need beside the upward one.
+/// Data for the two sideways components.
 #[derive(Debug, Clone)]
 struct VectorPart {
     allocator: VectorAllocator,

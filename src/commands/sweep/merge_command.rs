@@ -186,7 +186,7 @@ impl Merge {
             line += &format!(", {} cannot be computed", summary.failed);
         }
         if summary.inaccurate > 0 {
-            line += &format!(", {} miss the accuracy asked for", summary.inaccurate);
+            line += &format!(", {} miss the requested accuracy", summary.inaccurate);
         }
         sheet.line("designs", &line);
         if let Some(largest_n) = summary.largest_force_n {

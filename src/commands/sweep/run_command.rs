@@ -136,7 +136,7 @@ fn unmet(report: &RunReport) -> Result<(), Failure> {
     }
     if report.inaccurate > 0 {
         parts.push(format!(
-            "{} of {} miss the accuracy asked for",
+            "{} of {} miss the requested accuracy",
             report.inaccurate,
             count(report.points as usize, "design")
         ));

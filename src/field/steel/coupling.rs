@@ -250,7 +250,7 @@ fn dipole(x: [f64; 3], (y, n): GridPoint) -> f64 {
     (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (square * square.sqrt())
 }
 
-/// The columns of one angle of a sender's grid, one a ring, where its panels are long: `kernel`, of a
+/// The columns of one angle of a sender's grid, one per ring, where its panels are long: `kernel`, of a
 /// receiver's point and a sender's, is integrated over parts of a panel, short beside each receiver,
 /// against the polynomial that is one at one ring. The receiver is at `offset_m` from the sender.
 pub(super) fn integrate_stretched(

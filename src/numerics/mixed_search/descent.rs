@@ -17,7 +17,7 @@ pub struct Judged {
     pub limits: Vec<f64>,
 }
 
-/// What a unit of broken limit costs, in units of the objective; far above any multiplier.
+/// Cost of a unit of a violated limit, in units of the objective; far above any multiplier.
 pub const PENALTY: f64 = 20.0;
 
 impl Judged {
@@ -54,7 +54,7 @@ impl Judged {
 pub struct Ended {
     /// The place.
     pub u: Vec<f64>,
-    /// What was found there.
+    /// The values there.
     pub judged: Judged,
     /// By how much the objective grows with a unit more of each limit.
     pub multipliers: Vec<f64>,

@@ -72,7 +72,7 @@ const WIDEST: f64 = 0.6;
 const REFINED_WIDTH: f64 = 0.02;
 /// Places from which a design within the limits is looked for.
 const FEASIBLE_STARTS: usize = 12;
-/// What a region's width is multiplied by after success at its border, and after failure.
+/// Factors on a region's width after success at its border, and after failure.
 const WIDER: f64 = 1.6;
 const NARROWER: f64 = 0.5;
 /// Gains, as shares of the expected one, that count as success, and as a failure.

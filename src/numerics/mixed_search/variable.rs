@@ -1,6 +1,6 @@
 //! One variable of a search: its range, and which values of it are allowed.
 
-/// Which values a variable may have, besides lying in its range.
+/// Which values a variable may have within its range.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// Any.

@@ -460,7 +460,7 @@ def _read(path, size, keep):
 
 
 def _no_number(word):
-    raise ValueError(f"{word} is no number in JSON")
+    raise ValueError(f"{word} is not a number in JSON")
 
 
 def _finite(word):

@@ -18,7 +18,7 @@ const NUMBERED_PX: f64 = 9.0;
 /// Ticks along a side, about.
 const TICKS: f64 = 6.0;
 
-/// What a part is: its name, and how it looks.
+/// The role of a part: its name, and how it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Where the magnet's centre may be.
@@ -106,7 +106,7 @@ pub enum Body {
 /// A body and what it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// Its body.
     pub body: Body,
@@ -114,7 +114,7 @@ pub struct Part {
     pub label: Option<String>,
 }
 
-/// What a drawing of an array shows.
+/// The contents of a drawing of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArrayPlot {
     /// Above the views.

@@ -43,7 +43,7 @@ pub struct ReplayPlot<'a> {
     pub current_a: &'a [f64],
 }
 
-/// What one finger is given; one entry per position.
+/// Force and error at one finger; one entry per position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FingerCurves<'a> {
     /// m.

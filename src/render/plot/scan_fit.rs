@@ -27,7 +27,7 @@ const BAND: &str = "#0072b2";
 pub struct ScanColumn {
     /// Its name in the scan.
     pub name: String,
-    /// Measured, of the design as it is, and fitted; SI, one a row.
+    /// Measured, of the design as it is, and fitted; SI, one per row.
     pub values: [Vec<f64>; 3],
 }
 

@@ -83,7 +83,7 @@ fn lead(object: &CalibratedObject) -> Html {
         ),
         (None, _) | (_, None) => html.element(
             "p class=\"lead\"",
-            "There is no force constant for this object: nothing can be rendered as asked.",
+            "There is no force constant for this object: nothing can be rendered as requested.",
         ),
     };
     html

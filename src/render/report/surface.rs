@@ -21,7 +21,7 @@ struct Surface {
     columns: usize,
     /// Heights, m.
     height_m: Vec<Option<f64>>,
-    /// Given minus wanted, N; empty without a force constant.
+    /// Given minus requested, N; empty without a force constant.
     error_n: Vec<Option<f64>>,
 }
 

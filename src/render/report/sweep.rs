@@ -80,7 +80,7 @@ pub fn page(facts: &SweepFacts) -> String {
     for (number, what) in [
         (missing, "designs are missing"),
         (failed, "cannot be computed or have no coil"),
-        (inaccurate, "miss the accuracy asked for"),
+        (inaccurate, "miss the requested accuracy"),
     ] {
         if number > 0 {
             limits.element("li", &format!("{number} {what}."));

@@ -1,4 +1,4 @@
-//! What is uncertain costs the felt force: error against power, its table, and the page's section.
+//! The cost of uncertainties in felt force: error against power, its table, and the page's section.
 
 use std::io;
 

@@ -130,7 +130,7 @@ impl Looks {
         })
     }
 
-    /// What one core looks at in so many seconds, about: the same count on every machine.
+    /// The effort of one core in so many seconds, about: the same count on every machine.
     #[must_use]
     pub fn of_seconds(seconds: u64) -> Arc<Self> {
         Self::new(i64::try_from(seconds.saturating_mul(LOOKS_A_SECOND)).unwrap_or(i64::MAX))

@@ -15,7 +15,7 @@ use fluxform_numerics::axis::Axis;
 
 /// Relative width at which the search ends.
 const NARROW: f64 = 1e-6;
-/// Rectangles looked at, at most, beyond one a cell.
+/// Rectangles looked at, at most, beyond one per cell.
 const MOST: usize = 200_000;
 
 /// [`primitive`] of every cell by itself, x fastest, m; `None` where a corner has no surface.

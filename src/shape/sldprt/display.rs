@@ -1,4 +1,4 @@
-//! The display lists of a part: tables of triangle strips, one a face, in metres.
+//! The display lists of a part: tables of triangle strips, one per face, in metres.
 //!
 //! A table: u32 4, 8, 2, S and the lengths of S strips; u32 12, kind, 2, n and n points of three
 //! f32. The lengths add up to n, which no table of another kind does by chance.

@@ -77,7 +77,7 @@ fn slits(triangles: &[Triangle], reach: f64, width: f64) -> Vec<Triangle> {
             at.entry(*name).or_insert(*vertex);
         }
     }
-    // What closes an edge runs against what is there.
+    // The edge that closes another one runs in the opposite direction.
     let mut next: HashMap<u32, u32> = HashMap::new();
     for ([from, to], times) in Edges::new(&names).unbalanced {
         if times > 1 || next.insert(to, from).is_some() {

@@ -72,7 +72,7 @@ pub(super) struct Reply {
     pub(super) version: String,
     /// Millimetres of the file's unit.
     pub(super) unit_mm: f64,
-    /// The chord that was asked for.
+    /// The chord that was requested.
     pub(super) chord_mm: f64,
     /// Shells and faces that bound no body.
     pub(super) loose: usize,

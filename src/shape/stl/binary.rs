@@ -74,7 +74,7 @@ pub(super) fn read_from(
 struct Records {
     triangles: Vec<Triangle>,
     /// The bits of the largest magnitude: they are ordered as the numbers are, infinity and what
-    /// is no number above all.
+    /// is not a number above all.
     largest: i32,
 }
 

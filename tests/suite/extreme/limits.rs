@@ -415,7 +415,7 @@ fn as_designs() -> Vec<Case> {
         case("limits: a negative limit", refusal, 0.0, || {
             refused(design("mass_max_kg = -1.0"), &["limits.mass_max_kg"])
         }),
-        case("limits: a limit that is no number", refusal, 0.0, || {
+        case("limits: a limit that is not a number", refusal, 0.0, || {
             refused(design("settling_max_ms = nan"), &["limits.settling_max_ms"])
         }),
         case("limits: an infinite limit", refusal, 0.0, || {

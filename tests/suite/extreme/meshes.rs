@@ -99,7 +99,7 @@ fn files() -> Vec<Case> {
             bytes[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
             refused(stl::read(&bytes), &["4294967295", "1 whole triangles"])
         }),
-        case("shapes: a vertex that is no number", one, 0.0, || {
+        case("shapes: a vertex that is not a number", one, 0.0, || {
             let bytes = binary(&[[[0.0; 3], [1.0, f32::NAN, 0.0], [0.0, 1.0, 0.0]]]);
             refused(stl::read(&bytes), &["vertex 2 of triangle 1", "NaN"])
         }),

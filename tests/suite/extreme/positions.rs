@@ -148,7 +148,7 @@ fn one_position() -> Vec<Case> {
             },
         ),
         case(
-            "lambda: one position, a requested force that is no number",
+            "lambda: one position, a requested force that is not a number",
             "no current, saturated",
             0.0,
             || {
@@ -193,7 +193,7 @@ fn malformed() -> Vec<Case> {
                 &["no constraint points"],
             )
         }),
-        case("lambda: a force that is no number", of, 0.0, || {
+        case("lambda: a force that is not a number", of, 0.0, || {
             let p = Problem::new(vec![0.3, f64::NAN], vec![0.05; 2], vec![1.0]);
             refused(p.solve(), &["forces_n_per_a[1]", "NaN"])
         }),

@@ -271,7 +271,7 @@ fn refusals() -> Vec<Case> {
             },
         ),
         case(
-            "stiffness: an inductance that is no number",
+            "stiffness: an inductance that is not a number",
             coils,
             0.0,
             || {

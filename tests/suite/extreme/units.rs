@@ -186,7 +186,7 @@ fn designs() -> Vec<Case> {
             },
         ),
         case(
-            "units: a length that is no number",
+            "units: a length that is not a number",
             "refused with the key",
             0.0,
             || {

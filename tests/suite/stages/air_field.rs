@@ -60,7 +60,7 @@ struct Point {
 
 pub(super) fn number(text: &str) -> Result<f64, RunError> {
     text.parse()
-        .map_err(|_| RunError::Input(format!("{}: {text:?} is no number", AIR_COIL.path)))
+        .map_err(|_| RunError::Input(format!("{}: {text:?} is not a number", AIR_COIL.path)))
 }
 
 impl Section {

@@ -92,7 +92,7 @@ const MOST_ORDER: f64 = 24.0;
 pub struct Reaction {
     /// Points and outer normals, index = angle * nodes + node.
     points: Vec<([f64; 3], [f64; 3])>,
-    /// Area of a point's share of the surface, m^2, one a node.
+    /// Area of a point's share of the surface, m^2, one per node.
     areas_m2: Vec<f64>,
     /// Layer for a potential, one matrix a mode.
     inverses: Vec<DMatrix<f64>>,
