@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""One coil with its linear steel core by axisymmetric finite elements of high order (NGSolve).
+"""One coil with its linear steel core, on a round plate if there is one, by axisymmetric finite elements of high order
+(NGSolve).
 
     python3 scripts/peers/core_ngsolve.py DESIGN
     python3 scripts/peers/core_ngsolve.py --rows PROBLEM.json       # see rows.py
 
 Solves for w = A_phi / r (smooth on the axis, where B_z = 2 w) in a half-disc of radius BALL_M
 whose rim carries the dipole's condition dw/dn = -3 w / BALL_M; the mesh is refined in proportion
-towards the core's edges. One thread. Prints one JSON object: the gradient at the target, the
+towards the steel's edges. One thread. Prints one JSON object: the gradient at the target, the
 inductance, the unknowns, and the CPU seconds of meshing, solving and evaluating together.
 
 With --rows the elements' order is swept; the error is the largest of the gradients' on the axis
@@ -36,7 +37,7 @@ if not LACKS:
 
 ORDER = 8
 SWEPT_ORDERS = (2, 3, 4, 5, 6, 7, 8)
-EDGE_LEVELS = 16  # refinements towards the core's edges, each by EDGE_RATIO
+EDGE_LEVELS = 16  # refinements towards the steel's edges, each by EDGE_RATIO
 EDGE_RATIO = 0.15
 BALL_M = 3.0
 NEAR_M = 0.12  # within this distance of the core's middle elements are at most NEAR_SIZE_M wide
@@ -57,19 +58,27 @@ def half_disc(radius_m, z_m):
     return face
 
 
-def mesh_of(coil, core, order):
-    """Regions core, coil and air; the rim is called `outer`."""
+def mesh_of(coil, core, order, plate=None):
+    """Regions core, plate, coil and air; the rim is called `outer`."""
     core_r, bottom, top = core
     middle = (bottom + top) / 2
-    steel = rectangle(0, core_r, bottom, top, "core")
+    steel = [rectangle(0, core_r, bottom, top, "core")]
+    edges = [(core_r, bottom), (core_r, top)]
+    if plate:
+        plate_r, plate_bottom, plate_top = plate
+        steel.append(rectangle(0, plate_r, plate_bottom, plate_top, "plate"))
+        edges += [(plate_r, plate_bottom), (plate_r, plate_top)]
     winding = rectangle(*coil, "coil")
     near = half_disc(NEAR_M, middle)
     near.faces.maxh = NEAR_SIZE_M
     far = half_disc(BALL_M, middle) - near
-    shape = Glue([steel, winding, near - steel - winding, far])
+    air = near - winding
+    for body in steel:
+        air = air - body
+    shape = Glue([*steel, winding, air, far])
     for vertex in shape.vertices:
         r, z = vertex.p.x, vertex.p.y
-        if abs(r - core_r) < 1e-9 and min(abs(z - bottom), abs(z - top)) < 1e-9:
+        if min(math.hypot(r - edge_r, z - edge_z) for edge_r, edge_z in edges) < 1e-9:
             vertex.hpref = 1
     for edge in shape.edges:
         r, z = edge.center.x, edge.center.y
@@ -80,9 +89,9 @@ def mesh_of(coil, core, order):
     return mesh
 
 
-def solve(coil, core, turns, permeability, heights_m, order=ORDER):
+def solve(coil, core, turns, permeability, heights_m, order=ORDER, plate=None):
     """dB_z/dz per ampere on the axis at the heights, inductance, number of unknowns."""
-    mesh = mesh_of(coil, core, order)
+    mesh = mesh_of(coil, core, order, plate)
     space = H1(mesh, order=order)
     w, v = space.TnT()
 
@@ -90,7 +99,8 @@ def solve(coil, core, turns, permeability, heights_m, order=ORDER):
         """B turned by a right angle, over sqrt(r): grad(r^2 u) / r."""
         return CoefficientFunction((x * grad(u)[0] + 2 * u, x * grad(u)[1]))
 
-    reluctivity = mesh.MaterialCF({"core": 1 / permeability}, default=1.0) / MU_0
+    steel = dict.fromkeys(("core", "plate"), 1 / permeability)
+    reluctivity = mesh.MaterialCF(steel, default=1.0) / MU_0
     form = BilinearForm(space, symmetric=True)
     form += reluctivity * x * flux(w) * flux(v) * dx(bonus_intorder=4)
     form += x**3 * w * v / (MU_0 * BALL_M) * ds("outer")
@@ -147,6 +157,11 @@ def main():
         -length_m - core["below_mm"] / 1000,
         core["above_mm"] / 1000,
     )
+    plate_m = None
+    if "plate" in design:
+        plate = design["plate"]
+        top_m = core_m[1] - plate.get("gap_mm", 0.0) / 1000
+        plate_m = (plate["diameter_mm"] / 2000, top_m - plate["thickness_mm"] / 1000, top_m)
     ngsolve.SetNumThreads(1)
     ngsolve.ngsglobals.msg_level = 0
     start = time.process_time()
@@ -156,6 +171,7 @@ def main():
         coil["turns"],
         core["relative_permeability"],
         [design.get("target", {}).get("height_mm", 30.0) / 1000],
+        plate=plate_m,
     )
     result = {
         "gradient_t_per_m_per_a": gradient,

@@ -12,5 +12,5 @@ mod field;
 mod near;
 mod oracle;
 mod saturation;
-mod support;
+pub mod support;
 mod working_points;
