@@ -464,6 +464,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
             both[k * wide + n + k] = 1.0;
         }
         for k in 0..n {
+            fluxform_base::progress::poll();
             let size = |row: usize| both[row * wide + k].abs();
             let best = (k..n).fold(k, |a, b| if size(b) > size(a) { b } else { a });
             if size(best) <= 1e-14 {
@@ -508,6 +509,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
             let mut z = vec![Num::ZERO; n];
             let mut before = f64::INFINITY;
             for _ in 0..CORRECTIONS {
+                fluxform_base::progress::poll();
                 let rest: Vec<f64> = matrix
                     .iter()
                     .zip(right)
