@@ -73,7 +73,7 @@ fn open_plain(path: &Path, max_bytes: u64) -> io::Result<(File, u64)> {
 ///
 /// # Errors
 /// The system's error; those of [`check_plain`]; a file of holes.
-pub(crate) fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+pub fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     let mut content = Vec::new();
     content.try_reserve_exact(bytes as usize)?;

@@ -190,6 +190,7 @@ impl Reduced {
             .collect();
         let mut total = 0.0;
         for k in 0..n {
+            fluxform_base::progress::poll();
             // Column k of the inverse, by back substitution.
             let mut inverse = vec![0.0; k + 1];
             inverse[k] = 1.0;

@@ -101,6 +101,7 @@ impl Products {
     pub fn new(model: &Model) -> Self {
         let coils = coils(model);
         Self(Symmetric::new(coils, |i, j| {
+            fluxform_base::progress::poll();
             Num::dot(model.filled(i), model.filled(j))
         }))
     }

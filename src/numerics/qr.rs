@@ -49,6 +49,7 @@ impl<T: Real> Triangle<T> {
     fn absorb(&mut self, block: &mut [T], rows: usize, stride: usize) {
         let n = self.size;
         for j in 0..n {
+            fluxform_base::progress::poll();
             let (head, tail) = block.split_at_mut((j + 1) * stride);
             let v = &head[j * stride..j * stride + rows];
             let below = T::dot(v, v);
@@ -89,7 +90,6 @@ pub fn triangular_factor<T: Real>(
         let mut factor = Triangle::zero(columns);
         let mut block = vec![T::ZERO; CHUNK_ROWS * columns];
         for start in (group * group_rows..end).step_by(CHUNK_ROWS) {
-            fluxform_base::progress::poll();
             let range = start..end.min(start + CHUNK_ROWS);
             let filled = range.len();
             fill(range, &mut block, CHUNK_ROWS);

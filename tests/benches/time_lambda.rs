@@ -1,4 +1,4 @@
-//! Time and memory of the force constant's two forms over 1e2 to 1e7 points, and over 16 to 400 coils.
+//! Time and memory of the force constant's two forms over 1e2 to 1e7 points, and over 16 to 900 coils.
 //!
 //! ```text
 //! cargo bench --locked --bench time_lambda -- [MOST_POINTS] [THREADS]
@@ -41,7 +41,7 @@ const CASES: [(&str, usize, u32, u32); 6] = [
 
 /// Sides of the square arrays over which coils are counted: at a pitch of 50 mm under a plate over
 /// all of them, of that many points along a side.
-const SIDES: [usize; 7] = [4, 6, 8, 10, 12, 15, 20];
+const SIDES: [usize; 8] = [4, 6, 8, 10, 12, 15, 20, 30];
 const PITCH_MM: u32 = 50;
 const NODES: usize = 61;
 

@@ -39,6 +39,8 @@ use crate::{BenchRequest, run, scaling};
     ("fluxform-bench --quick --stage air-field --out air", "one stage, in a second"),
     ("fluxform-bench --quick --stage air-field --stage inductance --out two --format json",
      "two stages, for a program"),
+    ("fluxform-bench --quick --stage inductance --scaling --law inductance:coils --out grown",
+     "one stage against one size"),
     ("fluxform-bench --extreme --case wires", "the catalogue's cases about wires"),
 ]))]
 pub struct Arguments {
@@ -56,6 +58,9 @@ pub struct Arguments {
     /// Measure time and memory against numbers of coils, points, triangles, nodes and threads
     #[arg(long)]
     scaling: bool,
+    /// Of --scaling measure this law alone; may be repeated. The others stay as the folder has them
+    #[arg(long, value_name = "STAGE:AXIS", requires = "scaling", value_parser = law_names())]
+    law: Vec<String>,
     /// Run the stability catalogue; with --quick the part of it that every change runs
     #[arg(long, conflicts_with_all = ["stage", "peers", "scaling"])]
     extreme: bool,
@@ -107,6 +112,10 @@ fn stage_names() -> PossibleValuesParser {
     PossibleValuesParser::new(STAGES.map(|stage| stage.name))
 }
 
+fn law_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(scaling::LAWS.map(|law| law.name()))
+}
+
 impl Program for Arguments {
     fn common(&self) -> &Common {
         &self.common
@@ -126,6 +135,7 @@ impl Program for Arguments {
             stages: self.stage.clone(),
             peers: self.peers,
             scaling: self.scaling,
+            laws: self.law.clone(),
             out: self.folder()?,
             force: self.writing.force,
         };

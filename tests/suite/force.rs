@@ -10,6 +10,9 @@ use fluxform::progress::Silent;
 use fluxform::scene::Scene;
 use fluxform::scene::steel;
 
+/// Distance of the axes of two neighbours, m.
+const PITCH_M: f64 = 0.05;
+
 /// A force problem that owns its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forces {
@@ -47,7 +50,6 @@ impl Forces {
 /// # Errors
 /// A built-in design that cannot be read.
 pub fn with_coils(design: &BuiltIn, side: usize) -> Result<Design, RunError> {
-    const PITCH_M: f64 = 0.05;
     let mut design = design.design(Need::CALIBRATE)?;
     let middle = 0.5 * (side.max(1) - 1) as f64;
     let coils = side * side;
@@ -72,15 +74,60 @@ pub fn forces(
     samples: usize,
     height_m: fn(f64, f64) -> f64,
 ) -> Result<Forces, RunError> {
+    forces_over(&with_coils(design, side)?, HALF_M, samples, height_m)
+}
+
+/// The same of coils at half their pitch, whose fields overlap.
+///
+/// # Errors
+/// As [`forces`].
+pub fn forces_overlapping(
+    design: &BuiltIn,
+    side: usize,
+    samples: usize,
+    height_m: fn(f64, f64) -> f64,
+) -> Result<Forces, RunError> {
+    let mut design = with_coils(design, side)?;
+    for position_m in design.array.positions_m.iter_mut().flatten() {
+        *position_m *= 0.5;
+    }
+    forces_over(&design, HALF_M, samples, height_m)
+}
+
+/// The same of a surface as wide as the array, from its outermost axes on: three by three coils are as
+/// wide as the surface of [`forces`], and of more it is stretched along x and y.
+///
+/// # Errors
+/// As [`forces`].
+pub fn forces_over_all(
+    design: &BuiltIn,
+    side: usize,
+    samples: usize,
+    height_m: fn(f64, f64) -> f64,
+) -> Result<Forces, RunError> {
+    let half_m = 0.5 * (side.max(2) - 1) as f64 * PITCH_M;
+    let stretch = HALF_M / half_m;
     let design = with_coils(design, side)?;
-    let scene = Scene::new(&design)?;
+    forces_over(&design, half_m, samples, |x, y| {
+        height_m(stretch * x, stretch * y)
+    })
+}
+
+fn forces_over(
+    design: &Design,
+    half_m: f64,
+    samples: usize,
+    height_m: impl Fn(f64, f64) -> f64,
+) -> Result<Forces, RunError> {
+    let scene = Scene::new(design)?;
     let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let line = Axis {
-        from: -HALF_M,
-        to: HALF_M,
+        from: -half_m,
+        to: half_m,
         samples,
     }
     .nodes();
+    let height_m = &height_m;
     let points: Vec<[f64; 3]> = line
         .iter()
         .flat_map(|&y| line.iter().map(move |&x| [x, y, height_m(x, y)]))

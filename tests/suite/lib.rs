@@ -45,6 +45,8 @@ pub struct BenchRequest {
     pub peers: bool,
     /// Whether time and memory are measured against size.
     pub scaling: bool,
+    /// Which of those laws, by [`scaling::Spec::name`]; none: all. The others stay as the folder has them.
+    pub laws: Vec<String>,
     /// Folder of the files.
     pub out: PathBuf,
     /// Replace what is there, whatever it is.
@@ -102,7 +104,7 @@ pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchF
         Vec::new()
     };
     let scaling = if request.scaling {
-        scaling::laws(request.pace.quick, progress)?
+        scaling::laws(request, output::earlier_laws(request)?, progress)?
     } else {
         Vec::new()
     };

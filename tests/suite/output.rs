@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use crate::BenchRequest;
 use crate::catalogue::{CaseRow, CatalogueFile, write_cases};
-use crate::file::{BenchFile, write_laws, write_rows};
+use crate::file::{BenchFile, Law, write_laws, write_rows};
 use fluxform::RunError;
 use fluxform::bundle::artefact::{
     FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, UNITS,
 };
 use fluxform::bundle::atomic::{FileSet, Overwrite};
+use fluxform::bundle::read_bounded::read_plain;
 use fluxform::bundle::seal::to_record;
 
 use crate::catalogue_page;
@@ -21,6 +22,8 @@ use crate::summary::markdown;
 
 /// Name of the JSON file.
 pub const JSON: &str = "bench.json";
+/// A larger one is none of ours.
+const JSON_MAX_BYTES: u64 = 64 << 20;
 
 /// The options of a run as its record states them.
 #[must_use]
@@ -37,6 +40,8 @@ pub fn made_with(request: &BenchRequest) -> Options {
         stages,
         peers,
         scaling,
+        // Which are measured again: the file holds the others too.
+        laws: _,
         out: _,
         force: _,
     } = request;
@@ -75,6 +80,22 @@ fn overwrite(
 /// An output of something else.
 pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(), RunError> {
     Ok(overwrite(of, folder, JSON, force).check(&folder.join(JSON))?)
+}
+
+/// The laws of an earlier run in the folder, where not all are measured again.
+///
+/// # Errors
+/// A file of something else.
+pub fn earlier_laws(request: &BenchRequest) -> Result<Vec<Law>, RunError> {
+    let path = request.out.join(JSON);
+    if request.laws.is_empty() || !path.exists() {
+        return Ok(Vec::new());
+    }
+    let refused =
+        |fault: &dyn std::fmt::Display| RunError::Input(format!("{}: {fault}", path.display()));
+    let bytes = read_plain(&path, JSON_MAX_BYTES).map_err(|fault| refused(&fault))?;
+    let file: BenchFile = serde_json::from_slice(&bytes).map_err(|fault| refused(&fault))?;
+    Ok(file.scaling)
 }
 
 /// Writes all files; `files` lists them but for the JSON itself.

@@ -181,3 +181,61 @@ impl super::doubles::Optimum {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::scaled::Limits;
+    use super::super::worst_point;
+    use super::*;
+    use crate::problem::{ForceProblem, Settings};
+    use crate::qr_reduction::largest_entries;
+
+    /// Of so many points a sample is looked at first: what it misses, ripples a few points wide among
+    /// them, decides as it does on the path.
+    #[test]
+    fn constants_from_a_sample_of_the_points_are_those_of_the_path() {
+        const SIDE: usize = 130;
+        let (mut forces_n_per_a, mut height_m) = (Vec::new(), Vec::new());
+        for k in 0..SIDE * SIDE {
+            let [x, y] = [k % SIDE, k / SIDE].map(|i| i as f64 / (SIDE - 1) as f64 - 0.5);
+            for coil in 0..9 {
+                let [u, v] = [coil % 3, coil / 3].map(|i| 0.3 * (f64::from(i) - 1.0));
+                let square = (x - u).powi(2) + (y - v).powi(2) + 0.09;
+                forces_n_per_a.push(0.02 * square.powf(-2.5) * (0.09 - 0.3 * (square - 0.09)));
+            }
+            let ripple = 0.002 * (211.0 * x).sin() * (173.0 * y).cos();
+            height_m.push(0.04 + 0.02 * x - 0.013 * y + ripple);
+        }
+        let problem = ForceProblem {
+            forces_n_per_a: &forces_n_per_a,
+            height_m: &height_m,
+            offset_n: None,
+            weights: None,
+            lower_a: &[0.0; 9],
+            upper_a: &[2.0, 1.7, 1.9, 2.1, 1.3, 1.8, 2.2, 1.6, 1.5],
+            total_max_a: Some(13.0),
+            resistance_ohm: &[6.0; 9],
+        };
+        let settings = Settings::default();
+        let by_path = worst_point(&problem, &settings).unwrap();
+        assert!(by_path.path.is_some() && by_path.complete);
+        let largest = largest_entries(&problem);
+        let scaled = |limits| Scaled::new(&problem, &largest, Form::Worst, limits);
+        let (limited, free) = (scaled(Limits::All), scaled(Limits::Lower));
+        let alone = constants(&limited, &free, settings.jnd_weight)
+            .ok()
+            .unwrap();
+        let alone = super::super::without_path(&limited, &alone);
+        let pairs = [
+            (alone.lambda_linear_n_per_m, by_path.lambda_linear_n_per_m),
+            (alone.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m),
+            (alone.floor, by_path.floor),
+        ];
+        for (alone, by_path) in pairs {
+            let (alone, by_path) = (alone.unwrap(), by_path.unwrap());
+            assert!((alone / by_path - 1.0).abs() < 1e-10, "{alone} {by_path}");
+        }
+        let point = super::super::least_worst_error(&problem, alone.lambda_jnd_n_per_m.unwrap());
+        assert!(point.gap_n < 1e-12 * point.worst_error_n, "{point:?}");
+    }
+}

@@ -7,16 +7,14 @@
 
 use std::collections::BTreeSet;
 
-use super::blocks::{Blocks, misses};
-use super::points::{Course, Held, Points, Probe, bit, first_missed};
+use super::points::{Course, Held, Probe, bit, first_missed};
+use super::pool::Pool;
 use super::program::{End, Piece, Program, Stand, Work};
 use super::scaled::{Form, Scaled};
 use crate::qr_reduction::times_power;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-/// Points tried first: with more, the rest are only looked at to confirm.
-const POOL: usize = 4096;
 /// Rounding of a force summed in doubles, in units of the terms' sizes.
 const ROUNDINGS: f64 = 8.0;
 /// A force that is none, in scaled units: what rounding leaves at lambda = 0.
@@ -36,59 +34,10 @@ pub(super) struct Followed {
     pub doubt: f64,
 }
 
-/// A few points, copied side by side.
-struct Pool {
-    index: Vec<usize>,
-    known: BTreeSet<usize>,
-    forces: Vec<f64>,
-    heights: Vec<f64>,
-    offsets: Option<Vec<f64>>,
-}
-
-impl Pool {
-    fn new(all: Points, index: Vec<usize>) -> Self {
-        let mut pool = Self {
-            index: Vec::new(),
-            known: BTreeSet::new(),
-            forces: Vec::new(),
-            heights: Vec::new(),
-            offsets: all.offset_n.map(|_| Vec::new()),
-        };
-        for j in index {
-            pool.add(all, j);
-        }
-        pool
-    }
-
-    fn add(&mut self, all: Points, j: usize) {
-        self.index.push(j);
-        self.known.insert(j);
-        self.forces
-            .extend_from_slice(&all.forces_n_per_a[j * all.coils..(j + 1) * all.coils]);
-        self.heights.push(all.height_m[j]);
-        if let (Some(offsets), Some(offset)) = (&mut self.offsets, all.offset_n) {
-            offsets.push(offset[j]);
-        }
-    }
-
-    fn points(&self, coils: usize) -> Points<'_> {
-        Points {
-            coils,
-            forces_n_per_a: &self.forces,
-            height_m: &self.heights,
-            offset_n: self.offsets.as_deref(),
-        }
-    }
-}
-
 /// The points of one problem, and what has been learnt of them.
 pub(super) struct Search<'a> {
     form: Form,
-    all: Points<'a>,
-    /// Points looked at on the way; `None` where all of them are.
-    pool: Option<Pool>,
-    /// Bounds of all points, once they are looked at.
-    blocks: Option<Blocks>,
+    pool: Pool<'a>,
     /// Rows to begin with.
     working: Vec<(usize, bool)>,
 }
@@ -96,28 +45,13 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     /// Nothing is learnt yet of the points of `scaled`.
     pub fn new(scaled: &Scaled<'a>, form: Form) -> Self {
-        let problem = scaled.problem;
-        let all = Points {
-            coils: problem.coils(),
-            forces_n_per_a: problem.forces_n_per_a,
-            height_m: problem.height_m,
-            offset_n: problem.offset_n,
-        };
-        let count = problem.points();
-        let pool = (count > 2 * POOL).then(|| {
-            let mut index: BTreeSet<usize> = (0..POOL).map(|k| k * count / POOL).collect();
-            index.insert(scaled.highest);
-            Pool::new(all, index.into_iter().collect())
-        });
         let mut working = vec![(scaled.highest, true)];
         if form == Form::Worst {
             working.push((scaled.highest, false));
         }
         Self {
             form,
-            all,
-            pool,
-            blocks: None,
+            pool: Pool::new(scaled),
             working,
         }
     }
@@ -128,25 +62,16 @@ impl<'a> Search<'a> {
         let mut working = self.working.clone();
         for _ in 0..ROUNDS {
             fluxform_base::progress::poll();
-            let near = match &self.pool {
-                Some(pool) => pool.points(self.all.coils),
-                None => self.all,
-            };
-            let index = self.pool.as_ref().map(|pool| pool.index.as_slice());
-            let mut followed = solve(scaled, form, &working, near, index, work);
+            let mut followed = solve(scaled, form, &working, &self.pool, work);
             if followed.end != End::Whole {
                 return followed;
             }
+            // Two tests: the direction of the last piece is no place on the path.
             let (path, beyond) = probes(scaled, form, &mut followed);
-            let fresh = self.missed(scaled, &[path, beyond]);
-            if fresh.is_empty() {
+            let of_path = self.pool.take_missed(scaled, &path, form);
+            if of_path + self.pool.take_missed(scaled, &beyond, form) == 0 {
                 self.remember(&followed);
                 return followed;
-            }
-            if let Some(pool) = &mut self.pool {
-                for point in fresh {
-                    pool.add(self.all, point);
-                }
             }
             // The rows that the path rests on are those to begin with.
             for row in rows_of(&followed, &followed.pieces) {
@@ -161,21 +86,6 @@ impl<'a> Search<'a> {
             end: End::Stalled,
             doubt: 0.0,
         }
-    }
-
-    /// Points that the probes miss and the pool lacks.
-    fn missed(&mut self, scaled: &Scaled, probes: &[Vec<Probe>]) -> BTreeSet<usize> {
-        let Some(pool) = &self.pool else {
-            return BTreeSet::new();
-        };
-        let (all, form) = (self.all, self.form);
-        let blocks = self
-            .blocks
-            .get_or_insert_with(|| Blocks::new(all, scaled.largest));
-        let missed = probes
-            .iter()
-            .flat_map(|probes| misses(all, blocks, probes, form));
-        missed.filter(|point| !pool.known.contains(point)).collect()
     }
 
     /// Another path over the same points begins with the rows at the start of this one.
@@ -199,13 +109,12 @@ fn rows_of(followed: &Followed, pieces: &[Piece]) -> Vec<(usize, bool)> {
         .collect()
 }
 
-/// Follows the program of the `working` rows, and of those of the points `near` that it meets.
+/// Follows the program of the `working` rows, and of those of the pool's points that it meets.
 fn solve(
     scaled: &Scaled,
     form: Form,
     working: &[(usize, bool)],
-    near: Points,
-    index: Option<&[usize]>,
+    pool: &Pool,
     work: &mut Work,
 ) -> Followed {
     let mut program: Program = scaled.bounds();
@@ -215,13 +124,12 @@ fn solve(
         scaled.add_point(&mut program, form, j, up);
         rows.push(Some((j, up)));
     }
-    let count = near.height_m.len();
-    let point = |place: usize| index.map_or(place, |index| index[place]);
+    let near = pool.points();
     let known: BTreeSet<(usize, bool)> = working.iter().copied().collect();
-    let mut held: Vec<Held> = vec![0; count];
+    let mut held: Vec<Held> = vec![0; pool.count()];
     for (place, held) in held.iter_mut().enumerate() {
         for up in [true, false] {
-            if known.contains(&(point(place), up)) {
+            if known.contains(&(pool.point(place), up)) {
                 *held |= bit(up);
             }
         }
@@ -234,7 +142,7 @@ fn solve(
             return false;
         };
         held[place] |= bit(up);
-        let row = (point(place), up);
+        let row = (pool.point(place), up);
         scaled.add_point(program, form, row.0, row.1);
         rows.push(Some(row));
         true

@@ -1,7 +1,8 @@
 //! A program at one force constant, solved in doubles and finished in double-double.
 //!
 //! Few rows decide: the dual simplex method runs over those that are known, and the points that its
-//! vertex misses most join them until none is missed. The costs are raised a little, each by
+//! vertex misses most join them until none is missed: of many points those of a sample first, then
+//! of all the others, which are only looked at in blocks. The costs are raised a little, each by
 //! another part, so that arrays whose symmetry leaves many multipliers at zero do not stall it; at
 //! the vertex that this gives the true costs return, and the primal simplex method corrects what the
 //! raise has moved. Another force constant changes no multiplier, so the next program begins at the
@@ -10,6 +11,7 @@
 use rayon::prelude::*;
 
 use super::points::{Course, Held, Points, Probe, bit, first_missed};
+use super::pool::Pool;
 use super::program::{Piece, Program};
 use super::scaled::{Form, Scaled};
 use crate::qr_reduction::times_power;
@@ -61,9 +63,10 @@ pub(super) struct Optimum {
 pub(super) struct Doubles<'s, 'a> {
     scaled: &'s Scaled<'a>,
     form: Form,
-    points: Points<'a>,
+    pool: Pool<'a>,
     program: Program,
     rows: Vec<Option<(usize, bool)>>,
+    /// Of every point of the pool.
     held: Vec<Held>,
     basis: Vec<usize>,
     active: Vec<bool>,
@@ -78,11 +81,12 @@ pub(super) struct Doubles<'s, 'a> {
 impl<'s, 'a> Doubles<'s, 'a> {
     /// The program of the points and limits of `scaled`.
     pub fn new(scaled: &'s Scaled<'a>, form: Form) -> Self {
-        let problem = scaled.problem;
+        let pool = Pool::new(scaled);
         let mut program = scaled.bounds();
         let mut rows = vec![None; program.rows()];
         let first = program.rows();
-        let mut held: Vec<Held> = vec![0; problem.points()];
+        let mut held: Vec<Held> = vec![0; pool.count()];
+        let highest = pool.place(scaled.highest);
         let signs: &[bool] = if form == Form::Worst {
             &[true, false]
         } else {
@@ -91,7 +95,9 @@ impl<'s, 'a> Doubles<'s, 'a> {
         for &up in signs {
             scaled.add_point(&mut program, form, scaled.highest, up);
             rows.push(Some((scaled.highest, up)));
-            held[scaled.highest] |= bit(up);
+            if let Some(place) = highest {
+                held[place] |= bit(up);
+            }
         }
         let basis = scaled.first_basis(form, first, (form == Form::Worst).then_some(first + 1));
         let mut active = vec![false; program.rows()];
@@ -101,12 +107,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
         Self {
             scaled,
             form,
-            points: Points {
-                coils: problem.coils(),
-                forces_n_per_a: problem.forces_n_per_a,
-                height_m: problem.height_m,
-                offset_n: problem.offset_n,
-            },
+            pool,
             program,
             rows,
             held,
@@ -138,7 +139,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
         for _ in 0..TURNS {
             self.dual(lambda.to_f64(), raise, limit)?;
             let moved = self.primal(lambda.to_f64(), limit)?;
-            if !moved || self.violated(lambda.to_f64()).is_none() {
+            if !moved || !self.misses(lambda.to_f64()) {
                 break;
             }
             raise *= 0.1;
@@ -192,12 +193,13 @@ impl<'s, 'a> Doubles<'s, 'a> {
         row.iter().map(|v| v.to_f64()).collect()
     }
 
-    /// The known row that is violated most, where one is.
-    fn violated(&self, lambda: f64) -> Option<(usize, f64)> {
+    /// Whether the vertex violates a known row, or misses a point outside the pool.
+    fn misses(&mut self, lambda: f64) -> bool {
         let z = self.place(lambda);
-        self.most_violated(lambda, &z)
+        self.most_violated(lambda, &z).is_some() || self.take_missed(lambda, &z)
     }
 
+    /// The known row that is violated most, where one is.
     fn most_violated(&self, lambda: f64, z: &[f64]) -> Option<(usize, f64)> {
         let met = self.met(lambda, z);
         let mut worst = None;
@@ -297,8 +299,9 @@ impl<'s, 'a> Doubles<'s, 'a> {
         };
         let mut rows = speeds(self);
         let course = self.course(lambda, z, direction, soonest(&rows));
-        if let Some((point, up)) = first_missed(self.points, &self.held, &course, self.form) {
-            self.add(point, up);
+        let points = self.pool.points();
+        if let Some((place, up)) = first_missed(points, &self.held, &course, self.form) {
+            self.add(place, up);
             rows = speeds(self);
         }
         let within = soonest(&rows);
@@ -348,8 +351,10 @@ impl<'s, 'a> Doubles<'s, 'a> {
         }
     }
 
-    fn add(&mut self, point: usize, up: bool) {
-        self.held[point] |= bit(up);
+    /// Makes a row of the pool's point in this place.
+    fn add(&mut self, place: usize, up: bool) {
+        self.held[place] |= bit(up);
+        let point = self.pool.point(place);
         self.scaled
             .add_point(&mut self.program, self.form, point, up);
         self.rows.push(Some((point, up)));
@@ -358,9 +363,23 @@ impl<'s, 'a> Doubles<'s, 'a> {
 
     /// Adds the points that `z` misses most, one of every few neighbours; false where it misses none.
     fn add_missed(&mut self, lambda: f64, z: &[f64]) -> bool {
+        self.add_missed_of_pool(lambda, z)
+            || (self.take_missed(lambda, z) && self.add_missed_of_pool(lambda, z))
+    }
+
+    /// Takes the points into the pool that `z` misses; whether there are any.
+    fn take_missed(&mut self, lambda: f64, z: &[f64]) -> bool {
+        let mut probe = self.probe(lambda, z);
+        probe.limit_n += times_power(self.met(lambda, z), self.scaled.force_unit());
+        let come = self.pool.take_missed(self.scaled, &[probe], self.form);
+        self.held.resize(self.pool.count(), 0);
+        come > 0
+    }
+
+    fn add_missed_of_pool(&mut self, lambda: f64, z: &[f64]) -> bool {
         let probe = self.probe(lambda, z);
         let rounding_n = times_power(self.met(lambda, z), self.scaled.force_unit());
-        let (points, form) = (self.points, self.form);
+        let (points, form) = (self.pool.points(), self.form);
         let held = &self.held;
         let tasks = points.height_m.len().div_ceil(TASK);
         let mut missed: Vec<(f64, usize, bool)> = (0..tasks)
@@ -378,8 +397,8 @@ impl<'s, 'a> Doubles<'s, 'a> {
             .collect();
         missed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         missed.truncate(self.width().max(8));
-        for &(_, point, up) in &missed {
-            self.add(point, up);
+        for &(_, place, up) in &missed {
+            self.add(place, up);
         }
         !missed.is_empty()
     }
@@ -445,6 +464,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
             both[k * wide + n + k] = 1.0;
         }
         for k in 0..n {
+            fluxform_base::progress::poll();
             let size = |row: usize| both[row * wide + k].abs();
             let best = (k..n).fold(k, |a, b| if size(b) > size(a) { b } else { a });
             if size(best) <= 1e-14 {
@@ -489,6 +509,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
             let mut z = vec![Num::ZERO; n];
             let mut before = f64::INFINITY;
             for _ in 0..CORRECTIONS {
+                fluxform_base::progress::poll();
                 let rest: Vec<f64> = matrix
                     .iter()
                     .zip(right)

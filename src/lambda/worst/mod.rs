@@ -31,6 +31,7 @@ mod maxmin;
 mod path;
 mod perceptual_tolerance;
 mod points;
+mod pool;
 mod program;
 mod proof;
 mod scaled;

@@ -8,6 +8,7 @@ use std::process::Command;
 
 pub use sizes::{LAWS, Spec};
 
+use super::BenchRequest;
 use super::memory::peak_bytes;
 use crate::file::{Law, Outlook, SizeRow};
 use fluxform::RunError;
@@ -17,6 +18,8 @@ use fluxform::progress::Progress;
 /// Limits of a scene: an hour of processor time, and memory.
 const HOUR_S: f64 = 3600.0;
 const MEMORY_BYTES: f64 = 24.0 * 1024.0 * 1024.0 * 1024.0;
+/// Relative difference of sizes that are one.
+const SAME: f64 = 0.02;
 /// Times the seed's size.
 const FACTORS: [f64; 2] = [100.0, 10_000.0];
 /// The stage that does nothing: what the program takes without work.
@@ -115,17 +118,29 @@ fn row(size: f64, threads: usize, timing: &Timing) -> SizeRow {
     }
 }
 
-/// Every law, each size in a process of its own.
+/// The requested laws, each size in a process of its own, in their order with those of an `earlier` run.
 ///
 /// # Errors
 /// A process that fails; interruption.
-pub fn laws(quick: bool, progress: &dyn Progress) -> Result<Vec<Law>, RunError> {
+pub fn laws(
+    request: &BenchRequest,
+    earlier: Vec<Law>,
+    progress: &dyn Progress,
+) -> Result<Vec<Law>, RunError> {
+    let quick = request.pace.quick;
+    let wanted = |spec: &&Spec| request.laws.is_empty() || request.laws.contains(&spec.name());
     let idle = child(IDLE, IDLE, 0, 1)?.peak_bytes;
     let most = std::thread::available_parallelism().map_or(1, usize::from);
-    let count = LAWS.iter().map(|spec| spec.settings(quick, most).len());
+    let chosen = LAWS.iter().filter(wanted);
+    let count = chosen.map(|spec| spec.settings(quick, most).len());
     progress.begin("scaling", count.sum::<usize>() as u64);
     let mut laws = Vec::new();
     for spec in &LAWS {
+        if !wanted(&spec) {
+            let same = |law: &&Law| law.stage == spec.stage && law.axis == spec.axis;
+            laws.extend(earlier.iter().find(same).cloned());
+            continue;
+        }
         let mut sizes = Vec::new();
         for (setting, threads) in spec.settings(quick, most) {
             progress.check()?;
@@ -178,7 +193,14 @@ pub fn law(spec: &Spec, sizes: Vec<SizeRow>, idle_bytes: u64) -> Law {
     let at =
         |fit: &Fit, factor: f64| (fit.intercept + fit.slope * (factor * spec.seed_size).ln()).exp();
     let outlook = FACTORS.iter().filter(|_| !threads).map(|&factor| {
-        let (seconds, bytes) = (at(&time, factor), at(&memory, factor) + idle_bytes as f64);
+        let size = factor * spec.seed_size;
+        let measured = sizes
+            .iter()
+            .find(|row| (row.size / size - 1.0).abs() < SAME);
+        let (seconds, bytes) = match measured {
+            Some(row) => (row.seconds, row.peak_bytes as f64),
+            None => (at(&time, factor), at(&memory, factor) + idle_bytes as f64),
+        };
         let over = [(seconds / HOUR_S, "time"), (bytes / MEMORY_BYTES, "memory")];
         let worst = over.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         let breaks = worst.filter(|(share, _)| *share > 1.0);

@@ -1,7 +1,7 @@
 //! The sizes that grow, their ranges, and the work that is measured at each size.
 
 use super::THREADS;
-use crate::force::{forces, with_coils};
+use crate::force::{Forces, forces, forces_over_all, forces_overlapping, with_coils};
 use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
 use crate::stages::posed;
 use crate::test_surface::{dome_m, grid, known, mesh};
@@ -46,6 +46,12 @@ pub struct Spec {
 }
 
 impl Spec {
+    /// As the command line names it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{}:{}", self.stage, self.axis)
+    }
+
     /// Settings and threads; along the threads the one setting at 1, 2, 4 ... of `most`.
     #[must_use]
     pub fn settings(&self, quick: bool, most: usize) -> Vec<(usize, usize)> {
@@ -93,12 +99,12 @@ const fn spec(
 }
 
 /// Every law.
-pub const LAWS: [Spec; 20] = [
+pub const LAWS: [Spec; 21] = [
     spec(
         "map-table",
         "coils",
         COILS,
-        &[1, 2, 3, 4, 6, 8, 12],
+        &[1, 2, 3, 4, 6, 8, 12, 20, 30],
         map_coils,
     ),
     spec(
@@ -108,7 +114,13 @@ pub const LAWS: [Spec; 20] = [
         &[16, 31, 61, 91, 121, 181],
         map_nodes,
     ),
-    spec("inductance", "coils", COILS, &[2, 3, 5, 8, 12], matrix),
+    spec(
+        "inductance",
+        "coils",
+        COILS,
+        &[2, 3, 5, 8, 12, 20, 30],
+        matrix,
+    ),
     spec(
         "coupled-array",
         "coils",
@@ -141,21 +153,28 @@ pub const LAWS: [Spec; 20] = [
         "lambda-path",
         "coils",
         COILS,
-        &[3, 4, 6, 8, 10, 12, 15],
+        &[3, 4, 6, 8, 10, 15, 20, 30],
         path_coils,
     ),
     spec(
         "worst-point",
         "points",
         POINTS,
-        &[11, 21, 31, 61, 121],
+        &[11, 21, 31, 61, 121, 401, 1000],
         worst_points,
+    ),
+    spec(
+        "worst-point, 25 overlapping coils",
+        "points",
+        POINTS,
+        &[31, 61, 121, 241, 481, 1000],
+        worst_overlapping,
     ),
     spec(
         "worst-point",
         "coils",
         COILS,
-        &[3, 4, 6, 8, 10, 12, 15],
+        &[3, 4, 6, 8, 10, 15, 20, 30],
         worst_coils,
     ),
     spec(
@@ -191,7 +210,7 @@ pub const LAWS: [Spec; 20] = [
         "replay, currents",
         "coils",
         COILS,
-        &[3, 4, 6, 8, 12, 16],
+        &[3, 4, 6, 8, 12, 16, 30],
         allocate,
     ),
     spec("map-table", THREADS, 1.0, &[121], map_nodes),
@@ -296,34 +315,41 @@ fn coupled_points(samples: usize, effort: &Effort) -> Sized {
     Ok((points.len() as f64, measure(effort, work)?.1))
 }
 
-fn path(side: usize, samples: usize, effort: &Effort) -> Result<Timing, RunError> {
-    let given = forces(&SEED_AIR, side, samples, dome_m)?;
+fn path(given: &Forces, effort: &Effort) -> Result<Timing, RunError> {
     let problem = given.problem();
     let work = || Ok::<_, RunError>(lambda::solve(&problem, &Settings::default())?);
     Ok(measure(effort, work)?.1)
 }
 
 fn path_points(samples: usize, effort: &Effort) -> Sized {
-    Ok(((samples * samples) as f64, path(3, samples, effort)?))
+    let given = forces(&SEED_AIR, 3, samples, dome_m)?;
+    Ok(((samples * samples) as f64, path(&given, effort)?))
 }
 
 fn path_coils(side: usize, effort: &Effort) -> Sized {
-    Ok(((side * side) as f64, path(side, SAMPLES, effort)?))
+    let given = forces_over_all(&SEED_AIR, side, SAMPLES, dome_m)?;
+    Ok(((side * side) as f64, path(&given, effort)?))
 }
 
-fn worst(side: usize, samples: usize, effort: &Effort) -> Result<Timing, RunError> {
-    let given = forces(&SEED_AIR, side, samples, dome_m)?;
+fn worst(given: &Forces, effort: &Effort) -> Result<Timing, RunError> {
     let problem = given.problem();
     let work = || Ok::<_, RunError>(worst_point(&problem, &Settings::default())?);
     Ok(measure(effort, work)?.1)
 }
 
 fn worst_points(samples: usize, effort: &Effort) -> Sized {
-    Ok(((samples * samples) as f64, worst(3, samples, effort)?))
+    let given = forces(&SEED_AIR, 3, samples, dome_m)?;
+    Ok(((samples * samples) as f64, worst(&given, effort)?))
+}
+
+fn worst_overlapping(samples: usize, effort: &Effort) -> Sized {
+    let given = forces_overlapping(&SEED_AIR, 5, samples, dome_m)?;
+    Ok(((samples * samples) as f64, worst(&given, effort)?))
 }
 
 fn worst_coils(side: usize, effort: &Effort) -> Sized {
-    Ok(((side * side) as f64, worst(side, 21, effort)?))
+    let given = forces_over_all(&SEED_AIR, side, SAMPLES, dome_m)?;
+    Ok(((side * side) as f64, worst(&given, effort)?))
 }
 
 fn height_map(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Timing), RunError> {

@@ -16,6 +16,7 @@ fn request(stages: &[&str], rows: usize) -> BenchRequest {
         stages: stages.iter().map(|name| (*name).to_owned()).collect(),
         peers: false,
         scaling: false,
+        laws: Vec::new(),
         out: std::path::PathBuf::new(),
         force: false,
     }
