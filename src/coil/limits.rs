@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use super::circuit::{Circuit, turns_that_fit};
+use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
+use fluxform_design::iron::Plate;
 use fluxform_design::{Coil, Design, Limits};
 
 /// Relative difference between turns and turns that fit that counts as none.
@@ -33,11 +35,11 @@ pub enum LimitName {
     WireLength,
     /// Flux density in the core, T.
     CoreField,
-    /// Larger side of the rectangle that holds all coils, m.
+    /// Larger side of the rectangle that holds all coils and the plate, m.
     Footprint,
     /// Heat of all coils at their largest currents, W.
     ArrayPower,
-    /// Mass of all coils and cores, kg.
+    /// Mass of all coils, cores and the plate, kg.
     ArrayMass,
     /// Five time constants of the slowest pattern of currents in the array, s.
     ArraySettling,
@@ -139,7 +141,15 @@ impl Evaluated<'_> {
         circuit.settling_under_s(supply, current_a)
     }
 
-    /// Larger side of the rectangle that holds all coils, m.
+    /// Mass of all coils, cores and the plate, kg.
+    fn array_mass_kg(&self) -> f64 {
+        let plate_m3 = self.design.plate.as_ref();
+        let plate_m3 = plate_m3.map_or(0.0, Plate::volume_m3);
+        self.mass_kg * self.design.array.positions_m.len() as f64
+            + plate_m3 * STEEL_DENSITY_KG_PER_M3
+    }
+
+    /// Larger side of the rectangle that holds all coils and the plate, m.
     fn footprint_m(&self) -> Option<f64> {
         let outer_m = self.coil()?.outer_diameter_m;
         let side_m = |axis: usize| {
@@ -154,7 +164,9 @@ impl Evaluated<'_> {
             });
             high - low + outer_m
         };
-        Some(side_m(0).max(side_m(1)))
+        let plate = self.design.plate.iter();
+        let of_plate = plate.flat_map(|plate| plate.sides_m()).flatten();
+        Some(of_plate.fold(side_m(0).max(side_m(1)), f64::max))
     }
 
     /// The most heat of all coils that drivers and supply allow, W: as many coils at their largest current
@@ -343,7 +355,7 @@ pub static LIMITS: [Limit; 23] = [
         step: ("kg", 1.0),
         of_array: true,
         of: |limits| limits.array_mass_max_kg,
-        value: |at| Some(at.mass_kg * at.design.array.positions_m.len() as f64),
+        value: |at| Some(at.array_mass_kg()),
         ..SIZE
     },
     Limit {

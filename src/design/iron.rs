@@ -27,8 +27,17 @@ pub enum PlateOutline {
     Round(f64),
 }
 
-/// A level plate below the coils, its middle below the middle of their axes.
+/// A hole through a plate, for a screw.
 #[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hole {
+    /// Its axis, m.
+    pub at_m: [f64; 2],
+    /// Its diameter, m.
+    pub diameter_m: f64,
+}
+
+/// A level plate below the coils, its middle below the middle of their axes.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Plate {
     /// Thickness, m.
     pub thickness_m: f64,
@@ -36,8 +45,33 @@ pub struct Plate {
     pub outline: PlateOutline,
     /// From the cores' (else the windings') lower ends down to its upper face, m; cores touch it at 0.
     pub gap_m: f64,
+    /// Holes through it.
+    pub holes: Vec<Hole>,
     /// Material.
     pub steel: LinearSteel,
+}
+
+impl Plate {
+    /// Sides along x and y and diameter, m; those that it has.
+    #[must_use]
+    pub fn sides_m(&self) -> [Option<f64>; 3] {
+        match self.outline {
+            PlateOutline::Rectangle([x, y]) => [Some(x), Some(y), None],
+            PlateOutline::Round(diameter) => [None, None, Some(diameter)],
+        }
+    }
+
+    /// Its volume, m^3.
+    #[must_use]
+    pub fn volume_m3(&self) -> f64 {
+        let area_m2 = match self.outline {
+            PlateOutline::Rectangle([x, y]) => x * y,
+            PlateOutline::Round(diameter) => std::f64::consts::FRAC_PI_4 * diameter * diameter,
+        };
+        let of_hole = |hole: &Hole| std::f64::consts::FRAC_PI_4 * hole.diameter_m.powi(2);
+        let holes_m2: f64 = self.holes.iter().map(of_hole).sum();
+        (area_m2 - holes_m2) * self.thickness_m
+    }
 }
 
 /// The shape of a body about its middle.
@@ -97,6 +131,7 @@ pub(super) fn plate(mut s: Section<'_>) -> Option<Plate> {
     let (x, y) = (s.number("x_mm", &size), s.number("y_mm", &size));
     let diameter = s.number("diameter_mm", &size);
     let gap = s.number_or("gap_mm", &OFFSET_MM.bound(Bound::NotNegative), 0.0);
+    let holes = holes(&mut s);
     let steel = steel(&mut s);
     let outline = match (x, y, diameter) {
         (Some(x), Some(y), None) => Some(PlateOutline::Rectangle(
@@ -118,8 +153,32 @@ pub(super) fn plate(mut s: Section<'_>) -> Option<Plate> {
         thickness_m: m_from_mm(thickness.value),
         outline: outline?,
         gap_m: m_from_mm(gap.value),
+        holes,
         steel,
     })
+}
+
+/// Most holes of a plate.
+const HOLES_MAX: usize = 1000;
+
+fn holes(s: &mut Section<'_>) -> Vec<Hole> {
+    const KEY: &str = "holes_mm";
+    let given = s.tuples::<3>(KEY, &BODY_MM, HOLES_MAX, ["hole", "[x, y, diameter]"]);
+    let given = given.unwrap_or_default();
+    if let Some(index) = given.iter().position(|hole| hole.value[2] <= 0.0) {
+        let message = format!("hole {index} has no diameter above 0");
+        s.fault(KEY, message, "as in holes_mm = [[60.0, 60.0, 5.0]]");
+    }
+    given
+        .into_iter()
+        .map(|hole| {
+            let [x, y, diameter] = hole.value.map(m_from_mm);
+            Hole {
+                at_m: [x, y],
+                diameter_m: diameter,
+            }
+        })
+        .collect()
 }
 
 /// Kinds of bodies.

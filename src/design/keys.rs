@@ -14,7 +14,7 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[plate]\n[[iron]]\n[array]\n[magnet]\n[supply]\n[limits]\n\
                             [cooling]\n[uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
-                            [search.core]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
+                            [search.core]\n[search.plate]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
     });
@@ -83,6 +83,10 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "plate.gap_mm",
         "from the cores' lower ends (without cores the windings') down to it; at 0 cores join it",
+    ),
+    (
+        "plate.holes_mm",
+        "holes through it, as [x, y, diameter]; clear of feet, its edge and each other",
     ),
     ("plate.relative_permeability", "of its linear steel"),
     (
@@ -176,13 +180,16 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.core_field_max_t", "flux density in the core"),
     (
         "limits.footprint_max_mm",
-        "larger side of the rectangle that holds all coils",
+        "larger side of the rectangle that holds all coils and the plate",
     ),
     (
         "limits.array_power_max_w",
         "heat of all coils at the largest currents that the supply allows",
     ),
-    ("limits.array_mass_max_kg", "mass of all coils and cores"),
+    (
+        "limits.array_mass_max_kg",
+        "mass of all coils, cores and the plate",
+    ),
     (
         "limits.array_settling_max_ms",
         "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`",
@@ -251,6 +258,24 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "search.core.none",
         "whether coils without cores are tried too",
+    ),
+    (
+        "search.plate.thickness_mm",
+        "range of the plate's thickness",
+    ),
+    ("search.plate.x_mm", "range of its side along x"),
+    ("search.plate.y_mm", "range of its side along y"),
+    (
+        "search.plate.diameter_mm",
+        "range of a round plate's diameter",
+    ),
+    (
+        "search.plate.gap_mm",
+        "range of the gap between cores and plate",
+    ),
+    (
+        "search.plate.none",
+        "whether arrays without the plate are tried too",
     ),
     ("search.array.pitch_mm", "range of the pitch"),
     ("search.array.rows", "numbers of rows to choose from"),

@@ -85,6 +85,16 @@ impl Design {
         self.plate.is_some() || !self.iron.is_empty()
     }
 
+    /// The same with its cores as the only steel.
+    #[must_use]
+    pub fn without_iron(&self) -> Self {
+        Self {
+            plate: None,
+            iron: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// The B-H table that it names.
     #[must_use]
     pub fn curve_file(&self) -> Option<&Path> {

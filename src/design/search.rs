@@ -25,6 +25,16 @@ pub enum SearchKey {
     Above,
     /// `core.below_mm`.
     Below,
+    /// `plate.thickness_mm`.
+    PlateThickness,
+    /// `plate.x_mm`.
+    PlateX,
+    /// `plate.y_mm`.
+    PlateY,
+    /// `plate.diameter_mm`.
+    PlateDiameter,
+    /// `plate.gap_mm`.
+    PlateGap,
     /// `array.pitch_mm`.
     Pitch,
     /// `array.rows`.
@@ -99,6 +109,8 @@ pub struct SearchSpace {
     pub symmetry: Symmetry,
     /// Whether a coil without a core is tried too.
     pub without_core: bool,
+    /// Whether an array without its plate is tried too.
+    pub without_plate: bool,
 }
 
 impl SearchSpace {
@@ -176,6 +188,7 @@ pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
     );
     space.without_core = core.flag_or("none", false);
     core.finish();
+    read_plate(&mut space, s.section("plate"));
     let mut array = s.section("array");
     add(&mut space, &mut array, SearchKey::Pitch, "pitch_mm", &body);
     add(&mut space, &mut array, SearchKey::Rows, "rows", &COUNT);
@@ -217,6 +230,30 @@ pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
     space
 }
 
+fn read_plate(space: &mut SearchSpace, mut s: Section<'_>) {
+    let body = BODY_MM.positive();
+    let gap = OFFSET_MM.bound(Bound::NotNegative);
+    add(
+        space,
+        &mut s,
+        SearchKey::PlateThickness,
+        "thickness_mm",
+        &body,
+    );
+    add(space, &mut s, SearchKey::PlateX, "x_mm", &body);
+    add(space, &mut s, SearchKey::PlateY, "y_mm", &body);
+    add(
+        space,
+        &mut s,
+        SearchKey::PlateDiameter,
+        "diameter_mm",
+        &body,
+    );
+    add(space, &mut s, SearchKey::PlateGap, "gap_mm", &gap);
+    space.without_plate = s.flag_or("none", false);
+    s.finish();
+}
+
 /// Most magnets to choose from.
 const MAGNETS_MAX: usize = 100;
 
@@ -231,7 +268,16 @@ impl SearchKey {
             | Self::Clearance
             | Self::Above
             | Self::Below => true,
-            Self::Pitch | Self::Rows | Self::Columns | Self::Move | Self::Height => false,
+            Self::PlateThickness
+            | Self::PlateX
+            | Self::PlateY
+            | Self::PlateDiameter
+            | Self::PlateGap
+            | Self::Pitch
+            | Self::Rows
+            | Self::Columns
+            | Self::Move
+            | Self::Height => false,
         }
     }
 
@@ -245,6 +291,11 @@ impl SearchKey {
             | Self::Clearance
             | Self::Above
             | Self::Below
+            | Self::PlateThickness
+            | Self::PlateX
+            | Self::PlateY
+            | Self::PlateDiameter
+            | Self::PlateGap
             | Self::Pitch
             | Self::Move
             | Self::Height => false,

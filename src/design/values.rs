@@ -154,46 +154,57 @@ impl<'a> Section<'a> {
         rule: &Rule,
         most: usize,
     ) -> Option<Vec<Located<[f64; 2]>>> {
-        self.list(
-            key,
-            || of_rule("list of pairs [x, y]", rule),
-            || Without::Nothing,
-        );
+        self.tuples(key, rule, most, ["pair", "[x, y]"])
+    }
+
+    /// A list of at most `most` tuples of `N` numbers, each with its place; empty where at fault. `named`: what
+    /// one is, and its parts.
+    pub fn tuples<const N: usize>(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+        most: usize,
+        [one, parts]: [&str; 2],
+    ) -> Option<Vec<Located<[f64; N]>>> {
+        let kind = format!("list of {one}s {parts}");
+        self.list(key, || of_rule(&kind, rule), || Without::Nothing);
         let found = self.found(key)?;
-        let items = self.items(key, found, "a list of pairs [x, y]");
+        let items = self.items(key, found, &format!("a {kind}"));
         if items.len() > most {
-            let message = format!("{} pairs are more than {most}", items.len());
+            let message = format!("{} {one}s are more than {most}", items.len());
             self.fault(key, message, "shorten the list");
             return Some(Vec::new());
         }
-        let pairs: Option<Vec<_>> = (0..)
+        let expected = format!("a {one} {parts}");
+        let tuples: Option<Vec<_>> = (0..)
             .zip(items)
-            .map(|(i, item)| self.pair(key, i, item, rule))
+            .map(|(i, item)| self.one_tuple(key, i, item, rule, &expected))
             .collect();
-        let pairs = pairs.unwrap_or_default();
-        let values: Vec<f64> = pairs.iter().flat_map(|pair| pair.value).collect();
+        let tuples = tuples.unwrap_or_default();
+        let values: Vec<f64> = tuples.iter().flat_map(|tuple| tuple.value).collect();
         self.warn_of_slip(key, &values, rule, found);
-        Some(pairs)
+        Some(tuples)
     }
 
-    fn pair(
+    fn one_tuple<const N: usize>(
         &self,
         key: &str,
         index: usize,
         item: ValueRef<'a>,
         rule: &Rule,
-    ) -> Option<Located<[f64; 2]>> {
+        expected: &str,
+    ) -> Option<Located<[f64; N]>> {
         let path = format!("{}[{index}]", self.path_of(key));
-        let DeValue::Array(pair) = item.get_ref() else {
-            self.add_wrong_type(&path, item, "a pair [x, y]");
+        let DeValue::Array(parts) = item.get_ref() else {
+            self.add_wrong_type(&path, item, expected);
             return None;
         };
-        let [a, b] = &pair[..] else {
-            let message = format!("expected a pair [x, y], found {} values", pair.len());
+        if parts.len() != N {
+            let message = format!("expected {expected}, found {} values", parts.len());
             self.sink.add(Fault::error(path, message).at(&item.span()));
             return None;
-        };
-        let values = [self.checked(&path, a, rule), self.checked(&path, b, rule)];
+        }
+        let values = std::array::from_fn(|i| self.checked(&path, &parts[i], rule));
         values
             .iter()
             .all(|v| v.is_finite())

@@ -17,6 +17,7 @@ pub mod lagrange_basis;
 pub mod laplace;
 pub mod least_squares;
 pub mod log_rule;
+pub mod lu;
 pub mod matrix;
 pub mod mixed_search;
 pub mod qr;

@@ -23,7 +23,7 @@ const BUILD: &str = env!("FLUXFORM_BUILD");
 use crate::design::Steel as Described;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::core_flux_density::{Inspection, peak_depth_m};
-use crate::field::steel::passive::{PassivePull, Region};
+use crate::field::steel::passive::Region;
 use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
@@ -50,7 +50,7 @@ pub struct FieldStore {
     /// Of the design's array, once a shape needs it.
     inspection: OnceLock<Inspection>,
     /// The pull that the design leaves out, over the region of the last shape.
-    pull: Mutex<Option<(Region, Arc<Option<PassivePull>>)>>,
+    pull: Mutex<Option<(Region, Arc<Option<passive::Pull>>)>>,
     /// Points at which forces were computed while points were chosen, and the forces.
     tried: Mutex<Vec<TriedForces>>,
     /// The last shape's map and the digest of what it was made from.

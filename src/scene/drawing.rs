@@ -1,6 +1,6 @@
 //! A design as a drawing of its array.
 
-use crate::design::iron::{Iron, Plate, PlateOutline};
+use crate::design::iron::{Hole, Iron, Plate, PlateOutline};
 use crate::design::{Coil, Design};
 use crate::field::iron::bodies::{self, Solid};
 use crate::plot::array::{ArrayPlot, Body, Part, Role};
@@ -21,12 +21,12 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
     for (number, axis_m) in axes.iter().enumerate() {
         parts.extend(coil_parts(design, &coil, *axis_m, number));
     }
-    parts.extend(
-        design
-            .plate
-            .as_ref()
-            .map(|plate| part(Role::Plate, plate_body(design, &coil, plate))),
-    );
+    if let Some(plate) = &design.plate {
+        let z_m = plate_z_m(design, &coil, plate);
+        parts.push(part(Role::Plate, plate_body(design, plate, z_m)));
+        let drawn = |hole| part(Role::Plate, hole_body(hole, z_m, middle[1]));
+        parts.extend(plate.holes.iter().map(drawn));
+    }
     for iron in &design.iron {
         parts.extend(iron_parts(iron, middle[1]));
     }
@@ -47,12 +47,25 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
     })
 }
 
-/// The plate, its middle below the middle of the coils' axes.
-fn plate_body(design: &Design, coil: &Coil, plate: &Plate) -> Body {
-    let middle = middle(&design.array.positions_m);
+fn plate_z_m(design: &Design, coil: &Coil, plate: &Plate) -> [f64; 2] {
     let below_m = design.core.as_ref().map_or(0.0, |core| core.below_m);
     let top_m = -(coil.length_m + below_m) - plate.gap_m;
-    let z_m = [top_m - plate.thickness_m, top_m];
+    [top_m - plate.thickness_m, top_m]
+}
+
+fn hole_body(hole: &Hole, [low_m, high_m]: [f64; 2], section_y_m: f64) -> Body {
+    let [x, y] = hole.at_m;
+    let filled = bodies::Body {
+        solid: Solid::Tube([0.0, 0.5 * hole.diameter_m, high_m - low_m]),
+        centre_m: [x, y, 0.5 * (low_m + high_m)],
+        turn: bodies::UPRIGHT,
+    };
+    outlines(&filled, section_y_m, true, true)
+}
+
+/// The plate, its middle below the middle of the coils' axes.
+fn plate_body(design: &Design, plate: &Plate, z_m: [f64; 2]) -> Body {
+    let middle = middle(&design.array.positions_m);
     match plate.outline {
         PlateOutline::Round(diameter_m) => Body::Tube {
             axis_m: middle,
@@ -72,27 +85,14 @@ fn plate_body(design: &Design, coil: &Coil, plate: &Plate) -> Body {
 
 /// A body of steel cut at `section_y_m`, and its bore.
 fn iron_parts(iron: &Iron, section_y_m: f64) -> Vec<Part> {
+    let level = iron.rotate_deg[..2].iter().all(|angle| *angle == 0.0);
     let outlines = |solid: Solid, hollow: bool| {
         let solid = bodies::Body {
             solid,
             ..body(iron)
         };
-        let places: Vec<[f64; 3]> = solid.places_m().collect();
-        let ends = |axis: usize| {
-            let values = places.iter().map(|place| place[axis]);
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                [low.min(value), high.max(value)]
-            })
-        };
-        let level = iron.rotate_deg[..2].iter().all(|angle| *angle == 0.0);
         // From above the bore of a body that lies is not seen.
-        let from_above = places.iter().filter(|_| level || !hollow);
-        Body::Outlines {
-            ends_m: [0, 1, 2].map(ends),
-            plan_m: convex_hull(from_above.map(|place| [place[0], place[1]]).collect()),
-            section_m: convex_hull(crossings(&places, section_y_m)),
-            hollow,
-        }
+        outlines(&solid, section_y_m, level || !hollow, hollow)
     };
     let whole = body(iron).solid;
     let bore = match whole {
@@ -102,6 +102,24 @@ fn iron_parts(iron: &Iron, section_y_m: f64) -> Vec<Part> {
     let bore = bore.map(|bore| part(Role::Iron, outlines(bore, true)));
     let whole = part(Role::Iron, outlines(whole, false));
     std::iter::once(whole).chain(bore).collect()
+}
+
+/// A body's outlines from above, where that is seen, and where it is cut at `section_y_m`.
+fn outlines(solid: &bodies::Body, section_y_m: f64, above: bool, hollow: bool) -> Body {
+    let places: Vec<[f64; 3]> = solid.places_m().collect();
+    let ends = |axis: usize| {
+        let values = places.iter().map(|place| place[axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
+    };
+    let from_above = places.iter().filter(|_| above);
+    Body::Outlines {
+        ends_m: [0, 1, 2].map(ends),
+        plan_m: convex_hull(from_above.map(|place| [place[0], place[1]]).collect()),
+        section_m: convex_hull(crossings(&places, section_y_m)),
+        hollow,
+    }
 }
 
 /// Where the lines between neighbours on the faces' grids pass through the plane at `y_m`, by x and z.

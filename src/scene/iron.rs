@@ -2,11 +2,12 @@
 
 use super::Scene;
 use super::core_material::{Material, SceneCore};
+use super::passive_table::Turn;
 use crate::RunError;
-use crate::design::iron::{Iron as Described, IronShape, LinearSteel, PlateOutline};
+use crate::design::iron::{Hole, Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::{Coupling, Design};
 use crate::field::iron::array::{IronArray, IronPeaks, Peak, Unsolved};
-use crate::field::iron::bodies::{Body, Coils, Iron, Outline, Plate, Solid, UPRIGHT};
+use crate::field::iron::bodies::{Body, Coils, Fault, Iron, Outline, Plate, Site, Solid, UPRIGHT};
 use crate::field::iron::face::Point;
 use crate::field::steel::CoreShape;
 use crate::field::winding::Winding;
@@ -54,14 +55,8 @@ impl SceneIron {
                 "[array] coupling = \"none\": steel beyond the cores joins them; take it out",
             );
         }
-        if design.magnet.passive_force {
-            return refuse(
-                "[magnet] passive_force = true: the pull of [plate] and [[iron]] on the magnet is not \
-                 computed; leave it out",
-            );
-        }
         let axes = &design.array.positions_m;
-        let plate = design.plate.map(|plate| Plate {
+        let plate = design.plate.as_ref().map(|plate| Plate {
             outline: match plate.outline {
                 PlateOutline::Rectangle(sides) => Outline::Rectangle(sides),
                 PlateOutline::Round(diameter) => Outline::Round(diameter),
@@ -70,6 +65,7 @@ impl SceneIron {
             top_m: core.map_or(-winding.length_m, |core| core.shape.bottom_m) - plate.gap_m,
             thickness_m: plate.thickness_m,
             chi: chi(plate.steel),
+            holes: plate.holes.iter().map(site).collect(),
         });
         let bodies: Vec<(Body, f64)> = design
             .iron
@@ -81,7 +77,7 @@ impl SceneIron {
             .flat_map(|(body, _)| body.places_m())
             .map(|place| place[2]);
         let made = Self {
-            top_m: (heights.chain(plate.map(|plate| plate.top_m)))
+            top_m: (heights.chain(plate.as_ref().map(|plate| plate.top_m)))
                 .fold(f64::NEG_INFINITY, f64::max),
             plate,
             bodies,
@@ -89,7 +85,7 @@ impl SceneIron {
                 .map(|k| format!("[[iron]] {k}"))
                 .collect(),
             knee_t: (design.iron.iter().map(|iron| iron.steel))
-                .chain(design.plate.map(|plate| plate.steel))
+                .chain(design.plate.as_ref().map(|plate| plate.steel))
                 .fold(f64::INFINITY, |knee, steel| knee.min(steel.knee_t)),
         };
         made.check(axes, winding, core.map(|core| core.shape))?;
@@ -108,7 +104,8 @@ impl SceneIron {
             centre_m: [x, y, 0.5 * (low + high)],
             turn: UPRIGHT,
         };
-        let plate = self.plate.map(|plate| ("[plate]".to_owned(), plate.body()));
+        let plate = self.plate.as_ref();
+        let plate = plate.map(|plate| ("[plate]".to_owned(), plate.body()));
         let bodies = self
             .names
             .iter()
@@ -130,6 +127,7 @@ impl SceneIron {
                 let joined = name == "[plate]"
                     && self
                         .plate
+                        .as_ref()
                         .is_some_and(|plate| plate.top_m == shape.bottom_m);
                 if !joined && meets(body, &own, least) {
                     return Err(RunError::Input(format!(
@@ -153,6 +151,27 @@ impl SceneIron {
         Ok(())
     }
 
+    /// The windings, and it with the cores of `scene`.
+    ///
+    /// # Errors
+    /// A core beside the plate.
+    pub(super) fn bodies<'a>(&self, scene: &Scene<'a>) -> Result<(Coils<'a>, Iron), RunError> {
+        let coils = Coils {
+            winding: scene.winding,
+            positions_m: &scene.design.array.positions_m,
+            core: (scene.core.as_ref())
+                .map(|core| (core.shape, core.relative_permeability() - 1.0)),
+        };
+        let iron = Iron::new(coils, self.plate.as_ref());
+        let mut iron =
+            iron.map_err(|fault| RunError::Input(format!("[plate]: {fault}; {}", advice(&fault))))?;
+        // What has the permeability of air is none.
+        for (body, chi) in self.bodies.iter().filter(|(_, chi)| *chi > 0.0) {
+            iron = iron.with(body.faces(), *chi);
+        }
+        Ok((coils, iron))
+    }
+
     /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` up.
     ///
     /// # Errors
@@ -163,18 +182,7 @@ impl SceneIron {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<IronArray, RunError> {
-        let coils = Coils {
-            winding: scene.winding,
-            positions_m: &scene.design.array.positions_m,
-            core: (scene.core.as_ref())
-                .map(|core| (core.shape, core.relative_permeability() - 1.0)),
-        };
-        let iron = Iron::new(coils, self.plate.as_ref());
-        let mut iron =
-            iron.map_err(|fault| RunError::Input(format!("[plate]: {fault}; make it larger")))?;
-        for (body, chi) in &self.bodies {
-            iron = iron.with(body.faces(), *chi);
-        }
+        let (coils, iron) = self.bodies(scene)?;
         IronArray::new(coils, &iron, tolerance, lowest_m).map_err(|fault| match fault {
             Unsolved::OnEdge(on_edge) => on_edge.into(),
             Unsolved::TooLarge { .. } => RunError::Input(format!(
@@ -184,18 +192,33 @@ impl SceneIron {
         })
     }
 
+    /// Whether a map of the array to itself keeps it too.
+    pub(super) fn is_kept_by(&self, turn: Turn) -> bool {
+        let square = |plate: &Plate| match plate.outline {
+            Outline::Rectangle([a, b]) => a == b,
+            Outline::Round(_) => true,
+        };
+        // Whether other bodies are their own images is not looked at.
+        let alone = self.bodies.is_empty();
+        let kept = |plate: &Plate| {
+            (!turn.swap || square(plate))
+                && plate.keeps_holes(|from_middle| turn.of(from_middle, |_, v| -v))
+        };
+        alone && self.plate.as_ref().is_none_or(kept)
+    }
+
     /// Distance of a place from the nearest of it, m; below nothing inside.
     pub(super) fn distance_m(&self, place_m: Point) -> f64 {
-        let bodies = self.solids().into_iter();
-        bodies.fold(f64::INFINITY, |least, body| {
-            least.min(body.distance_m(place_m))
-        })
+        let plate = self.plate.iter().map(|plate| plate.distance_m(place_m));
+        let bodies = self.bodies.iter();
+        let all = plate.chain(bodies.map(|(body, _)| body.distance_m(place_m)));
+        all.fold(f64::INFINITY, f64::min)
     }
 
     /// The bodies, the plate among them.
     #[must_use]
     pub fn solids(&self) -> Vec<Body> {
-        let plate = self.plate.map(|plate| plate.body());
+        let plate = self.plate.as_ref().map(Plate::body);
         self.bodies
             .iter()
             .map(|(body, _)| *body)
@@ -223,24 +246,26 @@ impl SceneIron {
 
     /// How far inside its surface the largest |B| is looked for, m.
     pub(super) fn depth_m(&self) -> f64 {
-        let plate = self.plate.map(|plate| plate.body());
+        let plate = self.plate.as_ref().map(Plate::body);
         let bodies = self.bodies.iter().map(|(body, _)| *body).chain(plate);
         bodies.fold(DEPTH_M, |depth, body| depth.min(DEPTH_PART * size_m(&body)))
     }
 }
 
-/// Refuses steel beyond the cores for a command that takes one coil alone.
-///
-/// # Errors
-/// A design that has any.
-pub fn without_iron(design: &Design, command: &str) -> Result<(), RunError> {
-    if design.has_iron() {
-        return Err(RunError::Input(format!(
-            "{command} computes one coil with its core alone: take [plate] and [[iron]] out; `evaluate` and \
-             `lambda` of several designs compare plates"
-        )));
+fn advice(fault: &Fault) -> &'static str {
+    match fault {
+        Fault::BesidePlate(_) => "make it larger",
+        Fault::HoleAtEdge { .. } | Fault::HoleAtFoot { .. } | Fault::HolesMeet { .. } => {
+            "move the hole or make it smaller: what is left between is not resolved"
+        }
     }
-    Ok(())
+}
+
+fn site(hole: &Hole) -> Site {
+    Site {
+        at_m: hole.at_m,
+        radius_m: 0.5 * hole.diameter_m,
+    }
 }
 
 fn chi(steel: LinearSteel) -> f64 {

@@ -12,6 +12,7 @@ pub mod iron;
 pub mod maps;
 pub mod neighbours;
 pub mod passive;
+pub mod passive_iron;
 pub mod passive_map;
 mod passive_table;
 mod prepared_field;
@@ -45,6 +46,7 @@ use crate::numerics::vec3::{cross, dot};
 use crate::progress::Progress;
 use crate::scene::core_material::SceneCore;
 use crate::scene::iron::SceneIron;
+use crate::scene::passive_iron::HeldPulls;
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
 
@@ -128,6 +130,8 @@ pub struct Scene<'a> {
     pub upper_a: Vec<f64>,
     /// To what accuracy each stage is computed.
     pub tolerances: Tolerances,
+    /// Pulls of a plate and other bodies on the magnet, as they were last solved.
+    pulls: HeldPulls,
 }
 
 impl<'a> Scene<'a> {
@@ -188,6 +192,7 @@ impl<'a> Scene<'a> {
                 .collect(),
             circuit,
             tolerances,
+            pulls: HeldPulls::default(),
         })
     }
 

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::Scene;
+use super::iron::middle;
 use super::single::above_knee;
-use super::steel;
 use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
+use super::{Scene, passive, steel};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::circuit::Circuit;
@@ -55,6 +55,10 @@ pub struct IronSummary {
     pub knee_t: f64,
     /// [`ArraySummary::settling_s`].
     pub settling_s: f64,
+    /// Upward force of all unpowered steel on the magnet at the target's height over the coil nearest to the
+    /// array's middle, N; absent unless the design counts it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passive_force_n: Option<f64>,
 }
 
 fn iron_summary(
@@ -73,7 +77,24 @@ fn iron_summary(
         peak_at_m: peaks.elsewhere.place_m,
         knee_t: iron.knee_t,
         settling_s,
+        passive_force_n: None,
     })
+}
+
+/// The pull of all unpowered steel over the coil nearest to the array's middle at the target's height, N, and how
+/// sure it is; `None` unless the design counts it.
+fn iron_pull(scene: &Scene) -> Result<Option<(f64, StageAccuracy)>, RunError> {
+    if !scene.design.magnet.passive_force {
+        return Ok(None);
+    }
+    let axes = &scene.design.array.positions_m;
+    let [x, y] = middle(axes);
+    let away = |axis: &[f64; 2]| (axis[0] - x).hypot(axis[1] - y);
+    let nearest = axes.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+    let [x, y] = nearest.copied().unwrap_or_default();
+    let place = [x, y, scene.design.target_height_m];
+    let pull = passive::pull(scene, &[place], false)?;
+    Ok(pull.map(|pull| (pull.force_n(place)[2], passive::accuracy(&pull))))
 }
 
 /// How sure the largest flux densities are: the worst of cores, plate and bodies.
@@ -171,6 +192,17 @@ pub(crate) fn array(
         peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
         accuracy.extend(iron_accuracy(&peaks).map(|stage| ("iron_field", stage)));
         iron_summary(scene, slowest.settling_s(), &peaks, warnings)
+    });
+    let pulled = iron.is_some().then(|| iron_pull(scene)).transpose()?;
+    let iron = iron.map(|iron| match pulled.flatten() {
+        Some((force_n, stage)) => {
+            accuracy.insert("iron_passive_force", stage);
+            IronSummary {
+                passive_force_n: Some(force_n),
+                ..iron
+            }
+        }
+        None => iron,
     });
     let coils = axes
         .iter()

@@ -1,19 +1,21 @@
 //! The pull of the unpowered steel on a scene's magnet.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
+use super::iron::SceneIron;
+use super::passive_iron::{TabulatedPull, magnet_of, too_close};
 use super::passive_table::{region, scattered_z_n};
 use super::prepared_field::rounded_down;
 use super::{Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::design::MagnetModel;
-use crate::field::magnet::Cylinder;
 use crate::field::steel::passive::isolated::placed;
 use crate::field::steel::passive::magnet::{PassiveMagnet, dipoles};
 use crate::field::steel::passive::neighbours::Neighbours;
 use crate::field::steel::passive::reaction::{Reaction, ReactionResolution};
-use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
+use crate::field::steel::passive::{PassivePull, Pulled, Region};
 use crate::numerics::axis::Axis;
 
 /// Tolerance of the pull, relative to its own length: a small force beside the coils'.
@@ -21,11 +23,51 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
 /// The same where the pull is left out: how large it is matters to some digits only.
 pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+/// The same of a plate and other bodies, whose finer panels take a minute.
+const IRON_LEFT_OUT: f64 = 0.05;
 /// Of it what tabulating the pull may add.
 const TABLE_SHARE: f64 = 0.1;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
+
+/// The pull of a scene's unpowered steel.
+#[derive(Debug, Clone)]
+pub enum Pull {
+    /// Of cores.
+    Cores(Box<PassivePull>),
+    /// Of a plate, other bodies and the cores with them.
+    Iron(Arc<TabulatedPull>),
+}
+
+impl Pull {
+    /// Force on the magnet with its centre at a place of the region, N.
+    #[must_use]
+    pub fn force_n(&self, at_m: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Cores(pull) => pull.force_n(at_m),
+            Self::Iron(pull) => pull.force_n(at_m),
+        }
+    }
+
+    /// Vertical forces at many places, N.
+    #[must_use]
+    pub fn forces_z_n(&self, at_m: &[[f64; 3]]) -> Vec<f64> {
+        match self {
+            Self::Cores(pull) => pull.forces_z_n(at_m),
+            Self::Iron(pull) => pull.forces_z_n(at_m),
+        }
+    }
+
+    /// Estimated error of a force, relative to its length.
+    #[must_use]
+    pub fn relative_error(&self) -> f64 {
+        match self {
+            Self::Cores(pull) => pull.relative_error,
+            Self::Iron(pull) => pull.relative_error,
+        }
+    }
+}
 
 /// Whether `left_out` counts that cores magnetise each other.
 #[must_use]
@@ -40,7 +82,8 @@ pub(super) fn left_out_region(scene: &Scene, places_m: &[[f64; 3]]) -> Region {
     let workspace = &scene.design.workspace;
     let [x_m, y_m, [lowest_m, highest_m]] = region(places_m);
     let around = |axis: &Axis, [from, to]: [f64; 2]| [axis.from.min(from), axis.to.max(to)];
-    let touches_m = scene.magnet_depth_m() + scene.core.as_ref().map_or(0.0, |c| c.shape.top_m);
+    let top_m = scene.steel_extent_m().map_or(0.0, |(top_m, _)| top_m);
+    let touches_m = scene.magnet_depth_m() + top_m;
     let lowest_m = touches_m + rounded_down(lowest_m - touches_m);
     Region {
         x_m: around(&workspace.x_m, x_m),
@@ -53,7 +96,12 @@ pub(super) fn left_out_region(scene: &Scene, places_m: &[[f64; 3]]) -> Region {
 ///
 /// # Errors
 /// A magnet that touches the steel.
-pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<PassivePull>, RunError> {
+pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, RunError> {
+    if let Some(iron) = &scene.iron {
+        let tolerance = IRON_LEFT_OUT.max(scene.tolerances.forces);
+        let pull = scene.pulls.of(scene, iron, region, tolerance)?;
+        return Ok(pull.map(Pull::Iron));
+    }
     let Some(pulled) = pulled(scene, region, false) else {
         return Ok(None);
     };
@@ -61,13 +109,17 @@ pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<PassivePu
         coupled: couples_left_out(scene),
         ..pulled
     };
-    let pull = PassivePull::new(&pulled, LEFT_OUT_TOLERANCE);
-    pull.map(Some).map_err(|fault| too_close(&pulled, fault))
+    of_cores(&pulled, LEFT_OUT_TOLERANCE).map(Some)
 }
 
 /// Vertical pull at `places_m` from [`left_out`], N; about as exact.
-pub(super) fn left_out_z_n(scene: &Scene, pull: &PassivePull, places_m: &[[f64; 3]]) -> Vec<f64> {
-    scattered_z_n(scene, pull, places_m, TABLE_SHARE * LEFT_OUT_TOLERANCE)
+pub(super) fn left_out_z_n(scene: &Scene, pull: &Pull, places_m: &[[f64; 3]]) -> Vec<f64> {
+    scattered_z_n(
+        scene,
+        |at_m| pull.forces_z_n(at_m),
+        places_m,
+        TABLE_SHARE * LEFT_OUT_TOLERANCE,
+    )
 }
 
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
@@ -75,15 +127,11 @@ pub(super) fn left_out_z_n(scene: &Scene, pull: &PassivePull, places_m: &[[f64; 
 ///
 /// # Errors
 /// A magnet that touches the steel.
-pub fn pull(
-    scene: &Scene,
-    places_m: &[[f64; 3]],
-    alone: bool,
-) -> Result<Option<PassivePull>, RunError> {
+pub fn pull(scene: &Scene, places_m: &[[f64; 3]], alone: bool) -> Result<Option<Pull>, RunError> {
     pull_to(scene, places_m, alone, PASSIVE_TOLERANCE)
 }
 
-/// [`pull`] to another tolerance.
+/// [`pull`] to another tolerance; of a plate and other bodies to that of the forces at best.
 ///
 /// # Errors
 /// A magnet that touches the steel.
@@ -92,18 +140,39 @@ pub fn pull_to(
     places_m: &[[f64; 3]],
     alone: bool,
     tolerance: f64,
-) -> Result<Option<PassivePull>, RunError> {
+) -> Result<Option<Pull>, RunError> {
+    if let (Some(iron), false) = (&scene.iron, alone) {
+        let pull = of_iron(scene, iron, places_m, tolerance)?;
+        return Ok(pull.map(Pull::Iron));
+    }
     let Some(pulled) = pulled(scene, about(places_m), alone) else {
         return Ok(None);
     };
-    PassivePull::new(&pulled, tolerance)
-        .map(Some)
-        .map_err(|fault| too_close(&pulled, fault))
+    of_cores(&pulled, tolerance).map(Some)
+}
+
+fn of_cores(pulled: &Pulled, tolerance: f64) -> Result<Pull, RunError> {
+    PassivePull::new(pulled, tolerance)
+        .map(|pull| Pull::Cores(Box::new(pull)))
+        .map_err(|fault| too_close(pulled.region, fault))
+}
+
+/// Over the whole workspace, so that most places of a command share it.
+fn of_iron(
+    scene: &Scene,
+    iron: &SceneIron,
+    places_m: &[[f64; 3]],
+    tolerance: f64,
+) -> Result<Option<Arc<TabulatedPull>>, RunError> {
+    let region = left_out_region(scene, places_m);
+    let tolerance = tolerance.max(scene.tolerances.forces);
+    scene.pulls.of(scene, iron, region, tolerance)
 }
 
 /// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a
 /// core's share is the slope of a tabulated energy; here it is the gradient of the field that the
-/// core sends back, computed again for every place. The cores' coupling is solved to `tolerance`.
+/// core sends back, computed again for every place. The cores' coupling is solved to `tolerance`. Of a plate and
+/// other bodies the field is tabulated, so here it is the slope of the energy.
 ///
 /// # Errors
 /// A magnet that touches the steel.
@@ -112,6 +181,10 @@ pub fn direct_z_n(
     places_m: &[[f64; 3]],
     tolerance: f64,
 ) -> Result<Option<Vec<f64>>, RunError> {
+    if let Some(iron) = &scene.iron {
+        let pull = of_iron(scene, iron, places_m, tolerance)?;
+        return Ok(pull.map(|pull| pull.slopes_z_n(places_m)));
+    }
     let Some(pulled) = pulled(scene, about(places_m), false) else {
         return Ok(None);
     };
@@ -124,7 +197,7 @@ pub fn direct_z_n(
         pulled.region.z_m[0],
         0.5 * tolerance,
     )
-    .map_err(|fault| too_close(&pulled, fault))?;
+    .map_err(|fault| too_close(pulled.region, fault))?;
     let resolution = ReactionResolution::for_tolerance(tolerance, shape, magnet.gap_m());
     let core = Reaction::new(shape, mu_r, &resolution.finer());
     let axes = pulled.positions_m;
@@ -169,7 +242,7 @@ pub fn direct_z_n(
 /// Arguments of the pull's solvers; `None` without steel.
 fn pulled<'a>(scene: &'a Scene, region: Region, alone: bool) -> Option<Pulled<'a>> {
     let core = scene.core.as_ref()?;
-    let magnet = &scene.design.magnet;
+    let (moment_a_m2, size) = magnet_of(scene);
     Some(Pulled {
         shape: core.shape,
         relative_permeability: core.relative_permeability(),
@@ -179,11 +252,8 @@ fn pulled<'a>(scene: &'a Scene, region: Region, alone: bool) -> Option<Pulled<'a
             &scene.design.array.positions_m
         },
         coupled: !alone && coupled(scene.design),
-        moment_a_m2: scene.moment_a_m2,
-        size: (magnet.model == MagnetModel::Cylinder).then_some(Cylinder {
-            diameter_m: magnet.diameter_m,
-            length_m: magnet.length_m,
-        }),
+        moment_a_m2,
+        size,
         region,
     })
 }
@@ -193,19 +263,11 @@ fn about(places_m: &[[f64; 3]]) -> Region {
     Region { x_m, y_m, z_m }
 }
 
-fn too_close(pulled: &Pulled, fault: NoPull) -> RunError {
-    RunError::Input(format!(
-        "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet or the \
-         workspace",
-        pulled.region.z_m[0] * 1e3
-    ))
-}
-
 /// The pull's estimated error.
 #[must_use]
-pub fn accuracy(pull: &PassivePull) -> StageAccuracy {
+pub fn accuracy(pull: &Pull) -> StageAccuracy {
     StageAccuracy {
-        estimate: pull.relative_error,
+        estimate: pull.relative_error(),
         relative_to: "the pull at the place".to_owned(),
         method: "largest difference from finer solutions at places spread over the region"
             .to_owned(),

@@ -6,11 +6,10 @@
 use std::f64::consts::PI;
 
 use super::Scene;
-use super::passive;
-use super::passive_table::{Layout, Table, axial_m, symmetries};
+use super::passive::{self, Pull};
+use super::passive_table::{Layout, Table, axial_m, symmetries_of};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::field::steel::passive::PassivePull;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange;
 
@@ -52,7 +51,7 @@ impl PassiveMap {
     /// # Errors
     /// A magnet that touches the steel.
     pub fn new(scene: &Scene, grid: &Grid, tolerance: f64) -> Result<Option<Self>, RunError> {
-        let Some(core) = &scene.core else {
+        let Some((top_m, _)) = scene.steel_extent_m() else {
             return Ok(None);
         };
         let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
@@ -61,17 +60,17 @@ impl PassiveMap {
         let Some(pull) = passive::pull_to(scene, &corners, false, tolerance)? else {
             return Ok(None);
         };
-        let below_m = [core.shape.top_m, axial_m(scene)];
-        let turns = symmetries(&scene.design.array.positions_m, scene.moment_a_m2, ranges);
+        let below_m = [top_m, axial_m(scene)];
+        let turns = symmetries_of(scene, ranges);
         let mut aim = TABLE_SHARE * tolerance;
         let mut evaluations = 0;
         let mut best: Option<(f64, Table, Vec<f64>)> = None;
         for _ in 0..ATTEMPTS {
             let layout = Layout::new(ranges, below_m, &turns, aim);
             evaluations += layout.evaluations();
-            let table = layout.filled(&pull);
+            let table = layout.filled(|places_m| pull.forces_z_n(places_m));
             let values = table.on(grid);
-            let error = held_out_error(&pull, &table, grid, &values, core.shape.radius_m, scene);
+            let error = held_out_error(&pull, &table, grid, &values, scene);
             if best.as_ref().is_none_or(|(least, ..)| error < *least) {
                 best = Some((error, table, values));
             }
@@ -89,13 +88,13 @@ impl PassiveMap {
             largest_n: largest(&force_z_n[..plane]),
             force_z_n,
             accuracy: StageAccuracy {
-                estimate: MISSED * (pull.relative_error + error),
+                estimate: MISSED * (pull.relative_error() + error),
                 relative_to: "the largest pull at the node's height".to_owned(),
                 method: format!(
                     "{MISSED} times the sum of the pull's own error by finer solutions at places \
                      spread over the grid, {:.1e}, and that of tabulating it by comparison at {HELD_OUT} places off the \
                      table's nodes, {error:.1e}",
-                    pull.relative_error
+                    pull.relative_error()
                 ),
             },
             between,
@@ -122,18 +121,13 @@ fn largest(values: &[f64]) -> f64 {
 
 /// Largest difference of the table from the pull, relative to the largest at that height of the
 /// grid: beside the first axes at the lowest height, and spread over the region, most of them low.
-fn held_out_error(
-    pull: &PassivePull,
-    table: &Table,
-    grid: &Grid,
-    values: &[f64],
-    radius_m: f64,
-    scene: &Scene,
-) -> f64 {
+fn held_out_error(pull: &Pull, table: &Table, grid: &Grid, values: &[f64], scene: &Scene) -> f64 {
     let plane = grid.x_m.len() * grid.y_m.len();
     let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
     let (x, y) = (ends(&grid.x_m), ends(&grid.y_m));
     let axes = &scene.design.array.positions_m;
+    let radius_m =
+        (scene.core.as_ref()).map_or(scene.winding.outer_radius_m, |core| core.shape.radius_m);
     let places: Vec<(usize, [f64; 3])> = (0..HELD_OUT)
         .map(|k| {
             let part = |step: f64| (0.5 + step * k as f64).fract();

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use super::Scene;
 use crate::design::MagnetModel;
-use crate::field::steel::passive::PassivePull;
 use crate::map::tabulate::Grid;
 
 /// Places at which a table for scattered places is compared with the pull itself.
@@ -29,12 +28,12 @@ const FALL: i32 = 4;
 /// A map of the region to itself: x and y exchanged or not, then each mirrored or not.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Turn {
-    swap: bool,
+    pub swap: bool,
     mirror: [bool; 2],
 }
 
 impl Turn {
-    fn of<T: Copy>(self, [x, y]: [T; 2], mirrored: impl Fn(usize, T) -> T) -> [T; 2] {
+    pub fn of<T: Copy>(self, [x, y]: [T; 2], mirrored: impl Fn(usize, T) -> T) -> [T; 2] {
         let pair = if self.swap { [y, x] } else { [x, y] };
         std::array::from_fn(|axis| match self.mirror[axis] {
             true => mirrored(axis, pair[axis]),
@@ -82,6 +81,16 @@ pub(super) fn symmetries(
         })
         .filter(keeps)
         .collect()
+}
+
+/// [`symmetries`] of a scene's steel.
+pub(super) fn symmetries_of(scene: &Scene, region_m: [[f64; 2]; 3]) -> Vec<Turn> {
+    let axes_m = &scene.design.array.positions_m;
+    let mut turns = symmetries(axes_m, scene.moment_a_m2, region_m);
+    if let Some(iron) = &scene.iron {
+        turns.retain(|turn| iron.is_kept_by(*turn));
+    }
+    turns
 }
 
 /// Chebyshev nodes of an axis.
@@ -233,7 +242,8 @@ impl Layout {
         self.levels.iter().map(|level| level.own.len()).sum()
     }
 
-    pub fn filled(&self, pull: &PassivePull) -> Table {
+    /// `pull`: the vertical pull at places, N.
+    pub fn filled(&self, pull: impl Fn(&[[f64; 3]]) -> Vec<f64>) -> Table {
         let levels = self.levels.iter().map(|level| {
             let LevelLayout {
                 x,
@@ -248,7 +258,7 @@ impl Layout {
                 .collect();
             let weight = above_m.powi(FALL);
             let mut values = vec![0.0; firsts.len()];
-            for (i, force) in own.iter().zip(pull.forces_z_n(&places)) {
+            for (i, force) in own.iter().zip(pull(&places)) {
                 values[*i] = weight * force;
             }
             for i in 0..values.len() {
@@ -350,33 +360,33 @@ fn firsts([columns, rows]: [usize; 2], turns: &[Turn]) -> Vec<usize> {
 /// where that takes fewer evaluations; those that it is compared with decide whether it holds.
 pub(super) fn scattered_z_n(
     scene: &Scene,
-    pull: &PassivePull,
+    pull: impl Fn(&[[f64; 3]]) -> Vec<f64>,
     places_m: &[[f64; 3]],
     aim: f64,
 ) -> Vec<f64> {
-    tabulated_z_n(scene, pull, places_m, aim).unwrap_or_else(|| pull.forces_z_n(places_m))
+    tabulated_z_n(scene, &pull, places_m, aim).unwrap_or_else(|| pull(places_m))
 }
 
 fn tabulated_z_n(
     scene: &Scene,
-    pull: &PassivePull,
+    pull: impl Fn(&[[f64; 3]]) -> Vec<f64>,
     places_m: &[[f64; 3]],
     aim: f64,
 ) -> Option<Vec<f64>> {
     let ranges = region(places_m);
-    let below_m = [scene.core.as_ref()?.shape.top_m, axial_m(scene)];
-    let turns = symmetries(&scene.design.array.positions_m, scene.moment_a_m2, ranges);
+    let below_m = [scene.steel_extent_m()?.0, axial_m(scene)];
+    let turns = symmetries_of(scene, ranges);
     let layout = Layout::new(ranges, below_m, &turns, NODES_AIM * aim);
     if layout.evaluations() + 3 * COMPARED > places_m.len() / 2 {
         return None;
     }
-    let table = layout.filled(pull);
+    let table = layout.filled(&pull);
     let mut forces_n: Vec<f64> = places_m.par_iter().map(|at| table.at(*at)).collect();
     let compared = (0..COMPARED).map(|k| (2 * k + 1) * places_m.len() / (2 * COMPARED));
     let (reported, places): (Vec<f64>, Vec<_>) =
         compared.map(|i| (forces_n[i], places_m[i])).unzip();
     // Forces fall with the height: beside each the largest of those that are no higher counts.
-    let sure = pull.forces_z_n(&places);
+    let sure = pull(&places);
     let holds = (0..COMPARED).all(|k| {
         let at_height = (0..COMPARED).filter(|other| places[*other][2] >= places[k][2]);
         let size = at_height.fold(0.0_f64, |most, other| most.max(sure[other].abs()));
@@ -391,7 +401,7 @@ fn tabulated_z_n(
     let mut decide = strongest(places_m.len(), |i| forces_n[i].abs());
     decide.extend(strongest(places_m.len(), of_height));
     let places: Vec<[f64; 3]> = decide.iter().map(|i| places_m[*i]).collect();
-    for (i, sure) in decide.iter().zip(pull.forces_z_n(&places)) {
+    for (i, sure) in decide.iter().zip(pull(&places)) {
         forces_n[*i] = sure;
     }
     Some(forces_n)
@@ -508,11 +518,12 @@ mod tests {
                 [x, y, 0.031 + 0.02 * u * v]
             })
             .collect();
-        let pull = pull_to(&scene, &places, false, 1e-2).unwrap().unwrap();
+        let solved = pull_to(&scene, &places, false, 1e-2).unwrap().unwrap();
+        let pull = |at_m: &[[f64; 3]]| solved.forces_z_n(at_m);
         let aim = 1e-3;
-        let reported = tabulated_z_n(&scene, &pull, &places, aim).expect("a table that holds");
+        let reported = tabulated_z_n(&scene, pull, &places, aim).expect("a table that holds");
         let some: Vec<usize> = (0..places.len()).step_by(97).collect();
-        let sure = pull.forces_z_n(&some.iter().map(|i| places[*i]).collect::<Vec<_>>());
+        let sure = pull(&some.iter().map(|i| places[*i]).collect::<Vec<_>>());
         for (i, sure) in some.iter().zip(sure) {
             assert!(
                 (reported[*i] / sure - 1.0).abs() < 5e-3,
@@ -522,6 +533,6 @@ mod tests {
         }
         // Close to the steel it varies too fast for a table to pay.
         let low: Vec<[f64; 3]> = places.iter().map(|[x, y, _]| [*x, *y, 0.0021]).collect();
-        assert!(tabulated_z_n(&scene, &pull, &low, aim).is_none());
+        assert!(tabulated_z_n(&scene, pull, &low, aim).is_none());
     }
 }

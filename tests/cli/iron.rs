@@ -148,6 +148,169 @@ fn a_bundle_of_a_plate_verifies() {
     place.run(&["verify", "out/pair/flat"]).ends(0);
 }
 
+const FLAT: &str = "name = \"flat\"\nprimitive = \"flat\"\nside_mm = 30\nheight_mm = 20\n[points]\n\
+                    x_mm = [-15, 15, 5]\ny_mm = [-15, 15, 5]\n";
+
+/// A plate's pull on the magnet was refused.
+#[test]
+fn the_pull_of_cores_on_a_plate_is_counted_and_verified() {
+    let place = Place::new();
+    place.write("flat.toml", FLAT);
+    let calibrated = |more: &str, out: &str| {
+        design(&place, more);
+        let args = ["calibrate", "design.toml", "flat.toml", "--out", out];
+        let options = ["--tolerance", "0.03", "--format", "json"];
+        place.run(&[&args[..], &options].concat()).ends(0).json();
+        let read = |file: &str| -> Value {
+            serde_json::from_str(&place.text(&format!("{out}/pair/flat/{file}"))).unwrap()
+        };
+        (read("manifest.json"), read("lambda.json"))
+    };
+    let counting = format!("{PLATE}[magnet]\npassive_force = true\n");
+    let (without, freely) = calibrated(PLATE, "without");
+    let (with, pulled) = calibrated(&counting, "with");
+    let lambda = |file: &Value| file["lambda_n_per_m"].as_f64().unwrap();
+    assert!(
+        lambda(&pulled) < 0.95 * lambda(&freely),
+        "{pulled} {freely}"
+    );
+    // What is left out is as large as what the other counts.
+    let left = without["left_out"].as_array().unwrap();
+    let left = left
+        .iter()
+        .find(|part| part["what"] == "pull of the unpowered steel");
+    let cost = left.unwrap()["error_cost"].as_f64().unwrap();
+    let map = &with["map"]["passive_force"];
+    let largest = map["largest_n"].as_f64().unwrap();
+    let stated = cost * lambda(&freely) * 0.02;
+    assert!(stated > 0.0 && stated < 3.0 * largest, "{stated} {largest}");
+    place.run(&["verify", "with/pair/flat"]).ends(0);
+    // Over a core it is stronger with a plate than without.
+    let force = |more: &str, of: &dyn Fn(&Value) -> f64| of(&evaluated(&place, more));
+    let target = "[target]\nheight_mm = 20\n";
+    let on_plate = force(&format!("{counting}{target}"), &|result| {
+        result["array"]["iron"]["passive_force_n"].as_f64().unwrap()
+    });
+    let alone = force(
+        &format!("{CORE}[magnet]\npassive_force = true\n{target}"),
+        &|result| result["target"]["passive_force_n"].as_f64().unwrap(),
+    );
+    assert!(on_plate < alone && alone < 0.0, "{on_plate} {alone}");
+}
+
+#[test]
+fn one_coil_is_optimised_without_its_plate_and_says_so() {
+    let place = Place::new();
+    let limits =
+        "[limits]\nresistance_max_ohm = 3\nouter_diameter_max_mm = 24\nlength_max_mm = 30\n";
+    let best = |more: &str| {
+        design(&place, &format!("{more}{limits}"));
+        let args = [
+            "optimize",
+            "design.toml",
+            "--format",
+            "json",
+            "--starts",
+            "2",
+        ];
+        place.run(&args).ends(0).json()
+    };
+    let (alone, on_plate) = (best(CORE), best(PLATE));
+    assert_eq!(on_plate["objective"], alone["objective"]);
+    let warnings = on_plate["warnings"].to_string();
+    assert!(warnings.contains("[plate] and [[iron]]") && warnings.contains("optimize --for SHAPE"));
+}
+
+/// Sweeps of plates were refused.
+#[test]
+fn a_sweep_over_plates_has_what_evaluate_has() {
+    let place = Place::new();
+    design(&place, PLATE);
+    let plan = [
+        "sweep",
+        "plan",
+        "design.toml",
+        "--set",
+        "plate.thickness_mm=2:4:2",
+    ];
+    let options = ["--tolerance", "0.03", "--out", "plan.json"];
+    place.run(&[&plan[..], &options].concat()).ends(0);
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "points"])
+        .ends(0);
+    place
+        .run(&[
+            "sweep",
+            "merge",
+            "plan.json",
+            "points",
+            "--out",
+            "sweep.csv",
+        ])
+        .ends(0);
+    let table = place.text("sweep.csv");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
+    let cell = |row: usize, name: &str| -> f64 {
+        let column = rows[0].iter().position(|head| *head == name).unwrap();
+        rows[row][column].parse().unwrap()
+    };
+    let known = evaluated(&place, PLATE);
+    let iron = &known["array"]["iron"];
+    assert_eq!(
+        cell(2, "iron_peak_field_t"),
+        iron["peak_field_t"].as_f64().unwrap()
+    );
+    assert_eq!(
+        cell(2, "array_settling_s"),
+        iron["settling_s"].as_f64().unwrap()
+    );
+    assert_eq!(cell(2, "array_inductance_h"), inductance_h(&known));
+    assert!(cell(1, "iron_peak_field_t") > cell(2, "iron_peak_field_t"));
+    assert!(cell(1, "array_inductance_h") < cell(2, "array_inductance_h"));
+}
+
+/// The plate is a variable like any other: a limit of mass decides how thick it is.
+#[test]
+fn a_search_chooses_the_plate_within_its_limits() {
+    let place = Place::new();
+    place.write("flat.toml", FLAT);
+    let search = |more: &str| {
+        let limit = "[limits]\narray_mass_max_kg = 0.275\n";
+        let varied = "[search.plate]\nthickness_mm = [1.0, 6.0]\nnone = true\n";
+        design(&place, &format!("{PLATE}{limit}{varied}{more}"));
+        let args = [
+            "optimize",
+            "design.toml",
+            "--for",
+            "flat.toml",
+            "--out",
+            "best.toml",
+        ];
+        let options = [
+            "--evaluations",
+            "10",
+            "--tolerance",
+            "0.1",
+            "--format",
+            "json",
+            "--force",
+        ];
+        place.run(&[&args[..], &options].concat()).ends(0).json()
+    };
+    let found = search("");
+    let thickness = found["values"]["plate.thickness_mm"].as_f64().unwrap();
+    assert!(place.text("best.toml").contains("[plate]"));
+    assert!(found["gain"].as_f64().unwrap() > 0.9, "{found}");
+    let mass = found["limits"]["array_mass_kg"]["value"].as_f64().unwrap();
+    assert!(
+        mass <= 0.275 && thickness > 1.0 && thickness < 6.0,
+        "{mass} {thickness}"
+    );
+    let choices = found["choices"].as_array().unwrap();
+    assert_eq!(choices.len(), 2);
+    assert!(choices.iter().any(|choice| choice["plate"] == false));
+}
+
 fn refused(place: &Place, more: &str, words: &[&str]) -> Ran {
     design(place, more);
     place.run(&["evaluate", "design.toml"]).ends(3).says(words)
@@ -178,11 +341,16 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
         &plate("gap_mm = 0.02\n"),
         &["closer steel is not resolved"],
     );
+    let hole = |hole: &str| plate(&format!("holes_mm = [[0, 0, 3], {hole}]\n"));
     refused(
         &place,
-        &plate("[magnet]\npassive_force = true\n"),
-        &["passive_force"],
+        &hole("[16.5, 9, 5]"),
+        &["hole 1", "the foot of coil 1"],
     );
+    refused(&place, &hole("[33, 0, 5]"), &["hole 1", "the plate's edge"]);
+    refused(&place, &hole("[2, 2, 3]"), &["holes 0 and 1"]);
+    refused(&place, &hole("[2, 2]"), &["a hole [x, y, diameter]"]);
+    refused(&place, &hole("[2, 2, 0]"), &["no diameter"]);
     let box_at = |size: &str, at: &str| {
         body(&format!(
             "shape = \"box\"\nsize_mm = {size}\ncenter_mm = {at}\n"
@@ -214,10 +382,6 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
     inside
         .ends(3)
         .says(&["from the surface of [plate] or [[iron]]"]);
-    place
-        .run(&["optimize", "design.toml"])
-        .ends(3)
-        .says(&["optimize", "[plate]"]);
     let roof = "shape = \"box\"\nsize_mm = [60, 60, 4]\ncenter_mm = [0, 0, 20]\n";
     design(&place, &body(roof));
     let map = ["map", "design.toml", "--out", "out", "--tolerance", "0.05"];

@@ -3,7 +3,7 @@
 use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::components::Components;
 use fluxform_field::iron::array::{IronArray, Unsolved};
-use fluxform_field::iron::bodies::{Coils, Fault, Iron, Outline, Plate};
+use fluxform_field::iron::bodies::{Coils, Fault, Iron, Outline, Plate, Site};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
 use fluxform_field::steel::cored_coil::CoredCoil;
@@ -47,6 +47,7 @@ fn plate(outline: Outline, top_m: f64, thickness_m: f64, chi: f64) -> Plate {
         top_m,
         thickness_m,
         chi,
+        holes: Vec::new(),
     }
 }
 
@@ -295,4 +296,117 @@ fn more_steel_than_memory_holds_is_refused() {
     let (alike, moved) = (refused(&cores(0.0)), refused(&cores(1e-3)));
     assert_eq!((alike.1, moved.1), (4, 1));
     assert!(moved.0 >= 4 * alike.0, "{moved:?} {alike:?}");
+}
+
+fn two_on_a_plate(holes: Vec<Site>, tier: usize) -> IronArray {
+    let positions_m = [[-0.025, 0.0], [0.025, 0.0]];
+    let joined = Plate {
+        holes,
+        ..plate(
+            Outline::Rectangle([0.1, 0.06]),
+            SHAPE.bottom_m,
+            0.004,
+            999.0,
+        )
+    };
+    let with = coils(&positions_m, 999.0);
+    let iron = Iron::new(with, Some(&joined)).unwrap();
+    IronArray::at_resolution(with, &iron, 1e-4, tier).unwrap()
+}
+
+/// A hole on the flux's way from core to core takes inductance away, most of the mutual one; a tiny one, or one in a
+/// corner, nothing to speak of.
+#[test]
+fn a_hole_in_the_plate_takes_flux_as_far_as_it_is_in_its_way() {
+    let hole = |at_m, radius_m| Site { at_m, radius_m };
+    let inductances = |holes: Vec<Site>, tier: usize| {
+        let added = two_on_a_plate(holes, tier).added_inductance_h;
+        assert!(
+            (added[(0, 1)] - added[(1, 0)]).abs() < 5e-3 * added.amax(),
+            "{added}"
+        );
+        [added[(0, 0)], added[(0, 1)]]
+    };
+    let tier = 1;
+    let whole = inductances(Vec::new(), tier);
+    assert!(
+        whole[1] < 0.0,
+        "the plate's flux goes down through the other core"
+    );
+    let changed = |holes: Vec<Site>, tier: usize, whole: [f64; 2]| {
+        let with = inductances(holes, tier);
+        [0, 1].map(|k| with[k] / whole[k] - 1.0)
+    };
+    let between = changed(vec![hole([0.0, 0.0], 0.008)], tier, whole);
+    let tiny = changed(vec![hole([0.0, 0.0], 0.0004)], tier, whole);
+    let corner = changed(vec![hole([0.045, 0.025], 0.003)], tier, whole);
+    assert!(
+        between[0] < -1e-3 && between[1] < 2.0 * between[0],
+        "{between:?}"
+    );
+    for small in [tiny, corner] {
+        assert!(
+            small
+                .iter()
+                .all(|change| change.abs() < 0.3 * between[1].abs()),
+            "{small:?}"
+        );
+    }
+    // Finer panels have the same effect.
+    let whole = inductances(Vec::new(), tier + 1);
+    let finer = changed(vec![hole([0.0, 0.0], 0.008)], tier + 1, whole);
+    for (coarse, fine) in between.iter().zip(finer) {
+        assert!((coarse / fine - 1.0).abs() < 0.1, "{coarse} {fine}");
+    }
+}
+
+#[test]
+fn holes_that_cut_something_are_refused() {
+    let positions_m = [[-0.025, 0.0], [0.025, 0.0]];
+    let refused = |holes: &[([f64; 2], f64)]| {
+        let holes = holes.iter().map(|(at_m, radius_m)| Site {
+            at_m: *at_m,
+            radius_m: *radius_m,
+        });
+        let cut = Plate {
+            holes: holes.collect(),
+            ..plate(
+                Outline::Rectangle([0.1, 0.06]),
+                SHAPE.bottom_m,
+                0.004,
+                999.0,
+            )
+        };
+        Iron::new(coils(&positions_m, 999.0), Some(&cut)).err()
+    };
+    assert_eq!(refused(&[([0.0, 0.0], 0.005), ([0.0, 0.02], 0.003)]), None);
+    let foot = refused(&[([0.0, 0.0], 0.0129)]);
+    assert!(
+        matches!(
+            foot,
+            Some(Fault::HoleAtFoot {
+                hole: 0,
+                coil: 0,
+                ..
+            })
+        ),
+        "{foot:?}"
+    );
+    let edge = refused(&[([0.0, 0.0], 0.005), ([0.0, 0.0275], 0.003)]);
+    assert!(
+        matches!(edge, Some(Fault::HoleAtEdge { hole: 1, .. })),
+        "{edge:?}"
+    );
+    let met = refused(&[([0.0, 0.0], 0.005), ([0.0, 0.008], 0.003)]);
+    assert!(
+        matches!(
+            met,
+            Some(Fault::HolesMeet {
+                hole: 1,
+                other: 0,
+                ..
+            })
+        ),
+        "{met:?}"
+    );
 }

@@ -128,6 +128,7 @@ fn wide_plate(tier: usize) -> Outcome {
         top_m,
         thickness_m,
         chi: mu - 1.0,
+        holes: Vec::new(),
     };
     let iron = Iron::new(alone, Some(&plate)).unwrap();
     let array = IronArray::at_resolution(alone, &iron, 1e-6, tier).unwrap();

@@ -5,6 +5,7 @@ mod bh_curve;
 mod core_field;
 mod iron;
 mod iron_closed_forms;
+mod iron_passive;
 mod magnet;
 mod passive;
 mod saturated;

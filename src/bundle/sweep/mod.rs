@@ -7,7 +7,9 @@ mod summary;
 mod table;
 
 pub use plan::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
-pub use point::{ArrayRow, OptimumRow, PointFile, Row, Status};
+pub use point::{ArrayRow, IronRow, OptimumRow, PointFile, Row, Status};
 pub use store::{PointStore, StoredPoint};
 pub use summary::MergeSummary;
-pub use table::{ARRAY_COLUMNS, OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};
+pub use table::{
+    ARRAY_COLUMNS, IRON_COLUMNS, OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, columns, value_text,
+};

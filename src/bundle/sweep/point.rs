@@ -83,6 +83,20 @@ pub struct Row {
     /// The best array; absent where none was searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<ArrayRow>,
+    /// The coils of an array with steel beyond its cores; absent without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iron: Option<IronRow>,
+}
+
+/// All coils among a plate and other bodies of steel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct IronRow {
+    /// Largest self inductance.
+    pub inductance_h: f64,
+    /// Five time constants of the slowest pattern of currents.
+    pub settling_s: f64,
+    /// Largest |B| in the plate and other bodies with all coils at their rated currents.
+    pub peak_field_t: f64,
 }
 
 /// The array that is felt best within a design's limits.
@@ -252,6 +266,7 @@ mod tests {
             limits_met: true,
             optimum: None,
             array: None,
+            iron: None,
         };
         PointFile::new("abc", 7, Ok((row, Status::Done)))
     }

@@ -50,6 +50,12 @@ macro_rules! of_array {
     };
 }
 
+macro_rules! of_iron {
+    ($name:literal, $iron:ident => $value:expr) => {
+        of_row!($name, Number, row => row.iron.as_ref().map(|$iron| $value))
+    };
+}
+
 /// Columns after `index` and the set keys.
 pub static ROW_COLUMNS: [Column; 14] = [
     of_row!("turns", Number, row => Some(row.turns)),
@@ -93,50 +99,60 @@ pub static ARRAY_COLUMNS: [Column; 4] = [
     of_array!("evaluations", Count, best => Some(best.evaluations)),
 ];
 
-/// The columns of a sweep's results.
-pub fn columns(mode: Mode) -> impl Iterator<Item = &'static Column> {
+/// Columns after those of a sweep of designs with a plate or other steel beyond the cores.
+pub static IRON_COLUMNS: [Column; 3] = [
+    of_iron!("array_inductance_h", iron => iron.inductance_h),
+    of_iron!("array_settling_s", iron => iron.settling_s),
+    of_iron!("iron_peak_field_t", iron => iron.peak_field_t),
+];
+
+/// The columns of a sweep's results; whether its designs have steel beyond the cores.
+#[must_use]
+pub fn columns(mode: Mode, has_iron: bool) -> Vec<&'static Column> {
     let of_optimum: &[Column] = match mode {
         Mode::Evaluate => &[],
         Mode::Optimize | Mode::OptimizeWound => &OPTIMUM_COLUMNS,
         Mode::OptimizeFor => &ARRAY_COLUMNS,
     };
-    ROW_COLUMNS.iter().chain(of_optimum)
+    let of_iron: &[Column] = if has_iron { &IRON_COLUMNS } else { &[] };
+    ROW_COLUMNS
+        .iter()
+        .chain(of_iron)
+        .chain(of_optimum)
+        .collect()
 }
 
 /// Writes rows as they come.
 pub struct TableWriter<'a> {
     out: &'a mut dyn Write,
-    mode: Mode,
+    columns: Vec<&'static Column>,
     /// Variables of arrays, one column each.
     variables: &'a [String],
     line: Vec<u8>,
 }
 
 impl<'a> TableWriter<'a> {
-    /// Writes the header, with [`OPTIMUM_COLUMNS`] for a `mode` that optimises and [`ARRAY_COLUMNS`] and
-    /// the `variables` for one that searches arrays; `extra` are columns after all others, given to
-    /// every row.
+    /// Writes the header, of [`columns`] and of the `variables` of a sweep that searches arrays; `extra` are
+    /// columns after all others, given to every row.
     ///
     /// # Errors
     /// The writer's.
     pub fn begin<'k>(
         out: &'a mut dyn Write,
-        mode: Mode,
+        columns: Vec<&'static Column>,
         keys: impl IntoIterator<Item = &'k str>,
         variables: &'a [String],
         extra: &[&'k str],
     ) -> io::Result<Self> {
         let mut table = Self {
             out,
-            mode,
+            columns,
             variables,
             line: Vec::new(),
         };
         table.text("index");
-        for key in keys
-            .into_iter()
-            .chain(columns(mode).map(|column| column.name))
-        {
+        let names: Vec<&str> = table.columns.iter().map(|column| column.name).collect();
+        for key in keys.into_iter().chain(names) {
             table.text(key);
         }
         for key in variables {
@@ -163,7 +179,7 @@ impl<'a> TableWriter<'a> {
         for value in values {
             self.value(value);
         }
-        for column in columns(self.mode) {
+        for column in self.columns.clone() {
             self.cell(&(column.cell)(point));
         }
         let array = point.row.as_ref().and_then(|row| row.array.as_ref());
@@ -246,7 +262,7 @@ mod tests {
         let mut text = Vec::new();
         let mut table = TableWriter::begin(
             &mut text,
-            Mode::Evaluate,
+            columns(Mode::Evaluate, false),
             ["wire.diameter_mm", "a"],
             &[],
             &["front"],

@@ -309,6 +309,7 @@ impl<'a> ArrayProblem<'a> {
         all.retain(|bound| !self.unchanged.contains(&bound.key));
         self.add_winding(&design, &mut all);
         self.add_core(x, &design, &mut all);
+        add_plate(&design, &mut all);
         all
     }
 
@@ -433,9 +434,50 @@ impl<'a> ArrayProblem<'a> {
     }
 }
 
+/// What keeps all feet on the plate.
+fn add_plate(design: &Design, all: &mut Vec<Bounded>) {
+    const KEYS: [&str; 3] = ["plate_x_m", "plate_y_m", "plate_diameter_m"];
+    if let Some(plate) = &design.plate {
+        let sides = plate.sides_m().into_iter().zip(least_sides_m(design));
+        let of = |(key, (side_m, least_m)): (&'static str, (Option<f64>, f64))| {
+            Some(Bounded::at_least(key, side_m?, least_m * (1.0 + MARGIN)))
+        };
+        all.extend(KEYS.into_iter().zip(sides).filter_map(of));
+    }
+}
+
+/// The sides along x and y that hold every foot (without cores, every winding), and the diameter, m.
+fn least_sides_m(design: &Design) -> [f64; 3] {
+    let Some(coil) = &design.coil else {
+        return [0.0; 3];
+    };
+    let foot_m = match &design.core {
+        Some(core) => coil.inner_diameter_m - 2.0 * core.clearance_m,
+        None => coil.outer_diameter_m,
+    };
+    let places = &design.array.positions_m;
+    let ends = [0, 1].map(|axis| {
+        let of = places.iter().map(|place| place[axis]);
+        of.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+    });
+    let [x, y] = ends.map(|[low, high]| 0.5 * (low + high));
+    let far = |place: &[f64; 2]| (place[0] - x).hypot(place[1] - y);
+    let [along_x, along_y] = ends.map(|[low, high]| high - low + foot_m);
+    let across = 2.0 * places.iter().map(far).fold(0.0, f64::max) + foot_m;
+    [along_x, along_y, across]
+}
+
 /// Whether the core has a size and is clear of the neighbours' windings: steel that turns inside out or
 /// crosses other steel has no field.
 fn is_solid(design: &Design) -> bool {
+    if let Some(plate) = &design.plate {
+        let mut sides = plate.sides_m().into_iter().zip(least_sides_m(design));
+        if sides.any(|(side_m, least_m)| side_m.is_some_and(|side_m| side_m <= least_m)) {
+            return false;
+        }
+    }
     let (Some(coil), Some(core)) = (&design.coil, &design.core) else {
         return true;
     };

@@ -81,6 +81,8 @@ pub struct SearchedChoice {
     pub magnet_m: [f64; 2],
     /// Whether there are cores.
     pub core: bool,
+    /// Whether there is a plate.
+    pub plate: bool,
     /// Arrays of it that were computed.
     pub evaluations: usize,
     /// The largest objective within the limits, at the accuracy of the search; null where none was met.
@@ -105,6 +107,7 @@ impl SearchedChoice {
             layout: space.layout().map(|(layout, _)| layout.into()),
             magnet_m: [magnet.diameter_m, magnet.length_m],
             core: space.base().core.is_some(),
+            plate: space.base().plate.is_some(),
             evaluations: search.samples().len(),
             objective: met.map(|(_, judged)| judged.objective().exp()),
             values,

@@ -6,6 +6,7 @@ use fluxform_design::search::{SearchKey, SearchLayout, SearchSpace, SearchValues
 use fluxform_design::{ArrayGrid, Coil, Design};
 use fluxform_numerics::mixed_search::{Values, Variable};
 
+use super::plate;
 use super::positions::{self, Mode};
 
 /// A variable of the search. Lengths are millimetres, as in the file.
@@ -25,6 +26,8 @@ pub enum Axis {
     Above,
     /// The core's bottom below the winding's.
     Below,
+    /// A length of the plate; its key.
+    Plate(SearchKey),
     /// Distance of neighbouring axes.
     Pitch,
     /// How far a group of coils is moved; its number.
@@ -45,6 +48,7 @@ impl Axis {
             Self::Clearance => "core.clearance_mm",
             Self::Above => "core.above_mm",
             Self::Below => "core.below_mm",
+            Self::Plate(key) => plate::name(key),
             Self::Pitch => "array.pitch_mm",
             Self::Move(group) => return format!("array.move_{}_mm", group + 1),
             Self::Height => "shapes.height_mm",
@@ -62,6 +66,8 @@ pub struct Choice {
     pub magnet_mm: Option<[f64; 2]>,
     /// Whether the core is left out.
     pub without_core: bool,
+    /// Whether the plate is left out.
+    pub without_plate: bool,
 }
 
 /// All choices that `space` names for `design`.
@@ -93,21 +99,27 @@ pub fn choices(design: &Design, space: &SearchSpace) -> Vec<Choice> {
                     sizes.collect()
                 };
                 for magnet_mm in magnets {
-                    let cores: &[bool] = if space.without_core && design.core.is_some() {
-                        &[false, true]
-                    } else {
-                        &[false]
-                    };
-                    all.extend(cores.iter().map(|&without_core| Choice {
-                        grid,
-                        magnet_mm,
-                        without_core,
-                    }));
+                    for &without_core in
+                        with_and_without(space.without_core && design.core.is_some())
+                    {
+                        let without =
+                            with_and_without(space.without_plate && design.plate.is_some());
+                        all.extend(without.iter().map(|&without_plate| Choice {
+                            grid,
+                            magnet_mm,
+                            without_core,
+                            without_plate,
+                        }));
+                    }
                 }
             }
         }
     }
     all
+}
+
+fn with_and_without(both: bool) -> &'static [bool] {
+    if both { &[false, true] } else { &[false] }
 }
 
 /// Designs of one choice.
@@ -157,6 +169,9 @@ impl Space {
         let mut base = design.clone();
         if choice.without_core {
             base.core = None;
+        }
+        if choice.without_plate {
+            base.plate = None;
         }
         if let Some([diameter, length]) = choice.magnet_mm {
             (base.magnet.diameter_m, base.magnet.length_m) =
@@ -236,6 +251,11 @@ impl Space {
             Axis::Clearance => self.clearance_above_below_mm[0] = low,
             Axis::Above => self.clearance_above_below_mm[1] = low,
             Axis::Below => self.clearance_above_below_mm[2] = low,
+            Axis::Plate(key) => {
+                if let Some(plate) = &mut self.base.plate {
+                    plate::set(plate, key, m_from_mm(low));
+                }
+            }
             Axis::Pitch => self.pitch_mm = low,
             Axis::Layers => self.layers = low,
             Axis::TurnsPerLayer => self.turns_per_layer = low,
@@ -328,6 +348,7 @@ impl Space {
                 axis.key()
             ));
         }
+        self.add_plate(search)?;
         let alone = self.unit.len() < 2;
         for (key, axis) in [
             (SearchKey::Pitch, Axis::Pitch),
@@ -350,6 +371,30 @@ impl Space {
         }
         if self.axes.is_empty() {
             return Err("nothing is searched: add [search] with a range for a key, like array.pitch_mm = [40, 60]".to_owned());
+        }
+        Ok(())
+    }
+
+    fn add_plate(&mut self, search: &SearchSpace) -> Result<(), String> {
+        for (key, name) in plate::KEYS {
+            let Some(values) = search.values(key) else {
+                continue;
+            };
+            let Some(plate) = &self.base.plate else {
+                if search.without_plate {
+                    continue;
+                }
+                return Err(format!(
+                    "[search] varies {name}, but the design has no plate: add [plate], or leave the key out"
+                ));
+            };
+            if plate::length_m(plate, key).is_none() {
+                return Err(format!(
+                    "[search] varies {name}, which the design's plate has not: one with sides has x_mm and y_mm, a \
+                     round one diameter_mm"
+                ));
+            }
+            self.push(Axis::Plate(key), values);
         }
         Ok(())
     }
@@ -440,6 +485,12 @@ impl Space {
             Axis::Clearance => core.map_or(0.0, |core| mm(core.clearance_m)),
             Axis::Above => core.map_or(0.0, |core| mm(core.above_m)),
             Axis::Below => core.map_or(0.0, |core| mm(core.below_m)),
+            Axis::Plate(key) => {
+                let plate = design.plate.as_ref();
+                plate
+                    .and_then(|plate| plate::length_m(plate, *key))
+                    .map_or(0.0, mm)
+            }
             Axis::Pitch => pitch,
             Axis::Move(_) | Axis::Height => 0.0,
         };
@@ -558,6 +609,13 @@ impl Space {
             let [clearance, above, below] = self.core_mm(x).map(m_from_mm);
             (core.clearance_m, core.above_m, core.below_m) = (clearance, above, below);
         }
+        if let Some(plate) = &mut design.plate {
+            for (axis, value) in self.axes.iter().zip(x) {
+                if let Axis::Plate(key) = axis {
+                    plate::set(plate, *key, m_from_mm(*value));
+                }
+            }
+        }
         match self.grid(x) {
             Some((rows, columns, pitch)) => {
                 design.array.positions_m = grid_positions_m(rows, columns, pitch);
@@ -616,6 +674,16 @@ impl Space {
             ]);
         } else {
             remove.push("core");
+        }
+        if self.base.plate.is_some() {
+            let design = self.design(x);
+            let plate = design.plate.as_ref();
+            set.extend(plate::KEYS.iter().filter_map(|(key, name)| {
+                let length_m = plate::length_m(plate?, *key)?;
+                Some((*name, number(mm(length_m))))
+            }));
+        } else {
+            remove.push("plate");
         }
         let magnet = &self.base.magnet;
         set.extend([

@@ -41,7 +41,7 @@ struct Share {
 }
 
 impl IgnoredPull {
-    /// `None` without cores, or where the pull is counted.
+    /// `None` without steel, or where the pull is counted.
     ///
     /// # Errors
     /// Interruption.
@@ -51,12 +51,8 @@ impl IgnoredPull {
         points: &WantedPoints,
         field: ShapeField,
     ) -> Result<Option<Self>, RunError> {
-        if scene.design.magnet.passive_force || scene.core.is_none() {
+        if scene.design.magnet.passive_force || scene.steel_extent_m().is_none() {
             return Ok(None);
-        }
-        if scene.iron.is_some() {
-            let why = "the pull of [plate] and [[iron]] on the magnet is not computed";
-            return Ok(Some(Self::Unknown(why.to_owned())));
         }
         let forces_n = match field.pull_left_out_n(scene, &points.positions_m) {
             Ok(forces_n) => forces_n,

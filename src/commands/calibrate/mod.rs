@@ -688,7 +688,7 @@ fn passive_map(
     map: &FieldMap,
     progress: &dyn Progress,
 ) -> Result<Option<PassiveMap>, RunError> {
-    if !scene.design.magnet.passive_force || scene.core.is_none() {
+    if !scene.design.magnet.passive_force || scene.steel_extent_m().is_none() {
         return Ok(None);
     }
     progress.begin("passive force", 1);

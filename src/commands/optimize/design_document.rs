@@ -194,6 +194,7 @@ fn text_of(
                 faults.join("; ")
             ))
         })?;
+    let design = design.without_iron();
     Ok(WrittenDesign { text, design })
 }
 

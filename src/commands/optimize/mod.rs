@@ -31,7 +31,6 @@ use crate::coil::optimum::{
 };
 use crate::design::Design;
 use crate::progress::{Progress, Silent};
-use crate::scene::iron::without_iron;
 use crate::scene::rated::Rated;
 use crate::scene::steel;
 use crate::scene::{Scene, coupled};
@@ -107,8 +106,12 @@ pub fn optimize(
     request: &OptimizeRequest,
     progress: &dyn Progress,
 ) -> Result<Optimization, RunError> {
+    let (has_iron, alone) = (document.design.has_iron(), document.design.without_iron());
+    let document = &Document {
+        design: &alone,
+        ..*document
+    };
     let design = document.design;
-    without_iron(design, "optimize")?;
     let fixed = fixed(design, &request.fixed)?;
     // Before the search, which takes long: a design whose own coil is at fault is found at once.
     let given = design
@@ -164,6 +167,11 @@ pub fn optimize(
         result.design_text = Some(written.text);
     }
     result.take_given(given);
+    if has_iron {
+        let alone = "one coil with its core alone is optimised: [plate] and [[iron]] stay in the design, but do not \
+                     count; `optimize --for SHAPE` searches arrays with them";
+        result.warnings.push(alone.to_owned());
+    }
     Ok(result)
 }
 

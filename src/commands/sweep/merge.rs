@@ -13,8 +13,10 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
-    MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
+    MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, columns,
+    value_text,
 };
+use crate::design::template::Template;
 use crate::numerics::front::front;
 use crate::plot::landscape::Landscape;
 use crate::plot::pareto::{Panel, ParetoPlot};
@@ -250,10 +252,11 @@ fn write_front(
         .map(|(index, _)| found(plan, request, *index))
         .collect::<Result<Vec<_>, _>>()?;
     let variables = variables(plan, request)?;
+    let columns = columns(plan.mode, has_iron(plan)?);
     let written = set.write(name, |out| {
         let keys = plan.axes.iter().map(|axis| axis.key.as_str());
         let fronts = COSTS.map(|(_, _, column)| column);
-        let mut table = TableWriter::begin(out, plan.mode, keys, &variables, &fronts)?;
+        let mut table = TableWriter::begin(out, columns.clone(), keys, &variables, &fronts)?;
         for ((index, flags), point) in best.iter().zip(&points) {
             // A file that existed a moment ago may be gone.
             let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
@@ -301,7 +304,8 @@ fn gather(
     let mut gathered = Gathered::default();
     let keys = plan.axes.iter().map(|axis| axis.key.as_str());
     let variables = variables(plan, request).map_err(Stop::Job)?;
-    let mut table = TableWriter::begin(out, plan.mode, keys, &variables, &[])?;
+    let columns = columns(plan.mode, has_iron(plan).map_err(Stop::Job)?);
+    let mut table = TableWriter::begin(out, columns, keys, &variables, &[])?;
     progress.begin("merge", plan.points);
     for start in (0..plan.points).step_by(PORTION as usize) {
         progress.check().map_err(|error| Stop::Job(error.into()))?;
@@ -335,6 +339,20 @@ fn gather(
         ))));
     }
     Ok(gathered)
+}
+
+/// Whether its designs have steel beyond the cores.
+fn has_iron(plan: &PlanFile) -> Result<bool, RunError> {
+    const SECTIONS: [&str; 2] = ["plate", "iron"];
+    let template = Template::new(&plan.design_text, Path::new(""))
+        .map_err(|error| RunError::Input(error.to_string()))?;
+    let swept = |section: &str| {
+        let keys = plan.axes.iter().map(|axis| axis.key.split('.').next());
+        keys.flatten().any(|first| first == section)
+    };
+    Ok(SECTIONS
+        .iter()
+        .any(|section| template.get(section).is_some() || swept(section)))
 }
 
 /// The variables of all arrays that were found, in order; swept keys decide which there are.

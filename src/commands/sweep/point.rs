@@ -3,8 +3,11 @@
 use std::path::Path;
 
 use crate::RunError;
-use crate::bundle::sweep::{ArrayRow, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
+use crate::bundle::sweep::{
+    ArrayRow, IronRow, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value,
+};
 use crate::coil::optimum::Ending;
+use crate::commands::evaluate::evaluate;
 use crate::commands::optimize::array::physics::{ArrayPhysics, Constant};
 use crate::commands::optimize::array::{
     ArrayEnding, ArrayRequest, optimize_array, settling_in_array,
@@ -15,7 +18,6 @@ use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Silent, poll};
 use crate::scene::Scene;
-use crate::scene::iron::without_iron;
 use crate::scene::rated::{CircuitSummary, Rated};
 use crate::scene::sources::ShapeSource;
 use crate::units::FORCE_JND;
@@ -207,7 +209,9 @@ fn optimum(result: &Optimization) -> Computed {
 }
 
 fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
-    without_iron(design, "sweep")?;
+    if design.has_iron() {
+        return among_steel(design, tolerance);
+    }
     let rated = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
     let row = Row {
         current_a: rated.target.current_a,
@@ -220,6 +224,32 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunErr
     Ok(Computed::Row(
         Box::new(row),
         status(rated.accuracy_missed.is_empty()),
+    ))
+}
+
+/// A coil alone, and what `evaluate` has of the array with its plate and other steel.
+fn among_steel(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
+    let evaluation = evaluate(design, Vec::new(), tolerance)?;
+    let iron = evaluation.array.as_ref().and_then(|array| {
+        let own = array.coils.iter().map(|coil| coil.inductance_h);
+        Some(IronRow {
+            inductance_h: own.fold(0.0, f64::max),
+            settling_s: array.settling_s,
+            peak_field_t: array.iron.as_ref()?.peak_field_t,
+        })
+    });
+    let row = Row {
+        current_a: evaluation.target.current_a,
+        gradient_t_per_m_per_a: evaluation.target.gradient_t_per_m_per_a,
+        force_n: evaluation.target.force_n,
+        core_peak_field_t: evaluation.core.as_ref().map(|core| core.peak_field_t),
+        limits_met: evaluation.limits_met(),
+        iron,
+        ..row(evaluation.coil.turns, &evaluation.coil.circuit)
+    };
+    Ok(Computed::Row(
+        Box::new(row),
+        status(evaluation.accuracy_reached),
     ))
 }
 

@@ -35,7 +35,7 @@ pub(super) fn checks(
 ) -> Result<Vec<Check>, RunError> {
     const NODES: &str = "passive force nodes";
     let map = &bundle.map;
-    let counts = scene.design.magnet.passive_force && scene.core.is_some();
+    let counts = scene.design.magnet.passive_force && scene.steel_extent_m().is_some();
     let Some(values) = &map.passive_force_n else {
         let how = "the design has passive_force, the bundle holds none: calibrate again".to_owned();
         return Ok(counts

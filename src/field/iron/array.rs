@@ -26,7 +26,7 @@ pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
     (6, 8, 6, 12.0),
 ];
 /// Most entries of the dense matrices (1.6 GB).
-const MOST_ENTRIES: usize = 200_000_000;
+pub(super) const MOST_ENTRIES: usize = 200_000_000;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
 /// Steps from the best node to the largest |B|.
@@ -70,6 +70,11 @@ fn finest(iron: &Iron) -> Result<usize, Unsolved> {
     })
 }
 
+/// The first of the [`RESOLUTIONS`] to try for a tolerance.
+pub(super) fn coarsest(tolerance: f64) -> usize {
+    (-tolerance.log10().round()).clamp(1.0, 5.0) as usize - 1
+}
+
 /// The solved steel, per ampere of every winding.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct IronArray {
@@ -109,7 +114,7 @@ impl IronArray {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<Self, Unsolved> {
-        let wanted = (-tolerance.log10().round()).clamp(1.0, 5.0) as usize - 1;
+        let wanted = coarsest(tolerance);
         let last = finest(iron)?;
         // The error is the difference of two.
         let first = wanted.min(last - 1);

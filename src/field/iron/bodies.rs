@@ -1,34 +1,18 @@
 //! Bodies of steel as faces: cores, a plate that joins them, boxes, cylinders, tubes, meshes.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use super::face::{Curve, Face, Point, Resolution};
+use super::plate::{Cell, beyond, check_holes, is_apart};
+pub use super::plate::{Fault, Outline, Plate, Site};
 use crate::steel::CoreShape;
 use crate::winding::Winding;
-use fluxform_numerics::vec3::{dot, minus, plus};
+use fluxform_numerics::vec3::{dot, minus};
 
-/// Places closer than that are one, m.
-pub(super) const SAME_M: f64 = 1e-9;
-
-/// A point far out along a direction from another, m.
-fn beyond(at: Point, along: Point) -> Point {
-    plus(at, along.map(|a| 1e3 * a))
-}
-
-/// A ring wider than this many of its inner radii is cut more finely there.
-const WIDE: f64 = 3.0;
+pub(super) use super::plate::SAME_M;
 
 const UP: Point = [0.0, 0.0, 1.0];
 const DOWN: Point = [0.0, 0.0, -1.0];
-
-/// The outline of a plate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Outline {
-    /// Sides along x and y, m.
-    Rectangle([f64; 2]),
-    /// Diameter, m.
-    Round(f64),
-}
 
 /// A body's shape about its middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,23 +97,18 @@ impl Body {
     }
 }
 
-/// A level plate of steel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plate {
-    /// Its outline about its middle.
-    pub outline: Outline,
-    /// Its middle, m.
-    pub centre_m: [f64; 2],
-    /// Height of its upper face, m.
-    pub top_m: f64,
-    /// Thickness, m.
-    pub thickness_m: f64,
-    /// Relative permeability less one.
-    pub chi: f64,
-}
-
 impl Plate {
-    /// The plate as a body.
+    /// Distance of a place from its surface, m, no more than it is; below nothing inside.
+    #[must_use]
+    pub fn distance_m(&self, place_m: Point) -> f64 {
+        let in_holes = self.holes.iter().map(|hole| {
+            let [x, y] = [0, 1].map(|axis| place_m[axis] - hole.at_m[axis]);
+            hole.radius_m - x.hypot(y)
+        });
+        in_holes.fold(self.body().distance_m(place_m), f64::max)
+    }
+
+    /// The plate as a body, its holes filled.
     #[must_use]
     pub fn body(&self) -> Body {
         let [x, y] = self.centre_m;
@@ -140,16 +119,6 @@ impl Plate {
             },
             centre_m: [x, y, self.top_m - 0.5 * self.thickness_m],
             turn: UPRIGHT,
-        }
-    }
-
-    fn contains(&self, [x, y]: [f64; 2], margin_m: f64) -> bool {
-        let (x, y) = (x - self.centre_m[0], y - self.centre_m[1]);
-        match self.outline {
-            Outline::Rectangle([a, b]) => {
-                x.abs() + margin_m < 0.5 * a && y.abs() + margin_m < 0.5 * b
-            }
-            Outline::Round(diameter) => x.hypot(y) + margin_m < 0.5 * diameter,
         }
     }
 }
@@ -171,14 +140,6 @@ impl Coils<'_> {
         self.core
             .map_or(self.winding.outer_radius_m, |(shape, _)| shape.radius_m)
     }
-}
-
-/// Why bodies cannot be solved.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Fault {
-    /// A core is not wholly on the plate.
-    #[error("the core of coil {0} is not wholly above the plate")]
-    BesidePlate(usize),
 }
 
 /// Bodies, and what is known of their symmetry.
@@ -203,7 +164,14 @@ impl Iron {
         let about = plate.map_or_else(|| middle(coils.positions_m), |plate| plate.centre_m);
         let mut iron = Self {
             planes_m: about,
-            mirrors: [0, 1].map(|axis| is_mirrored(coils.positions_m, axis, about[axis])),
+            mirrors: [0, 1].map(|axis| {
+                let mirrored = |mut place: [f64; 2]| {
+                    place[axis] = -place[axis];
+                    place
+                };
+                is_mirrored(coils.positions_m, axis, about[axis])
+                    && plate.is_none_or(|plate| plate.keeps_holes(mirrored))
+            }),
             ..Self::none()
         };
         let touching = match (coils.core, plate) {
@@ -275,16 +243,35 @@ impl Iron {
         self.top_m = self.top_m.max(plate.top_m);
         let radius_m = coils.radius_m();
         let mut faces = plate_sides(plate);
-        for (number, site) in coils.positions_m.iter().enumerate() {
-            if !plate.contains(*site, radius_m + SAME_M) {
+        let mut sites = Vec::new();
+        for (number, at_m) in coils.positions_m.iter().enumerate() {
+            if !plate.contains(*at_m, radius_m + SAME_M) {
                 return Err(Fault::BesidePlate(number));
             }
-            let cell = Cell::new(plate, coils.positions_m, number);
-            faces.extend(cell.ring(*site, radius_m, plate.top_m, UP, touching));
-            faces.extend(cell.ring(*site, radius_m, bottom_m, DOWN, false));
-            faces.extend(disc(*site, radius_m, bottom_m, DOWN, false));
+            sites.push(Site {
+                at_m: *at_m,
+                radius_m,
+            });
+        }
+        check_holes(plate, touching.then_some(&sites))?;
+        // Where no core stands, a disc only serves to cut the plate.
+        let clear = |site: &Site| plate.holes.iter().all(|hole| is_apart(hole, site));
+        sites.retain(|site| touching || clear(site));
+        let discs = sites.len();
+        sites.extend(&plate.holes);
+        for (number, site) in sites.iter().enumerate() {
+            let cell = Cell::new(plate, &sites, number);
+            let is_hole = number >= discs;
+            faces.extend(cell.ring(site, plate.top_m, UP, touching || is_hole));
+            faces.extend(cell.ring(site, bottom_m, DOWN, is_hole));
+            if is_hole {
+                let wall = cylinder_side(site.at_m, site.radius_m, [bottom_m, plate.top_m]);
+                faces.extend(wall.into_iter().map(Face::turned));
+                continue;
+            }
+            faces.extend(disc(site.at_m, site.radius_m, bottom_m, DOWN, false));
             if !touching {
-                faces.extend(disc(*site, radius_m, plate.top_m, UP, false));
+                faces.extend(disc(site.at_m, site.radius_m, plate.top_m, UP, false));
             }
         }
         self.faces.extend(faces.into_iter().map(|mut face| {
@@ -474,152 +461,6 @@ fn plate_sides(plate: &Plate) -> Vec<Face> {
             })
             .to_vec()
         }
-    }
-}
-
-/// What lies nearer to one core than to the others, on the plate: about the core's axis, lines n.x = c and
-/// the plate's rim.
-struct Cell {
-    /// n, c, and whether it is the plate's edge.
-    lines: Vec<([f64; 2], f64, bool)>,
-    /// The middle of a round plate, and its radius.
-    rim: Option<([f64; 2], f64)>,
-}
-
-impl Cell {
-    fn new(plate: &Plate, sites: &[[f64; 2]], own: usize) -> Self {
-        let [x, y] = sites[own];
-        let to_centre = [plate.centre_m[0] - x, plate.centre_m[1] - y];
-        let mut lines = Vec::new();
-        let mut rim = None;
-        match plate.outline {
-            Outline::Rectangle([a, b]) => {
-                for (normal, half) in [
-                    ([1.0, 0.0], 0.5 * a),
-                    ([-1.0, 0.0], 0.5 * a),
-                    ([0.0, 1.0], 0.5 * b),
-                    ([0.0, -1.0], 0.5 * b),
-                ] {
-                    let c = half + normal[0] * to_centre[0] + normal[1] * to_centre[1];
-                    lines.push((normal, c, true));
-                }
-            }
-            Outline::Round(diameter) => rim = Some((to_centre, 0.5 * diameter)),
-        }
-        for (number, other) in sites.iter().enumerate() {
-            let d = [other[0] - x, other[1] - y];
-            let long = d[0].hypot(d[1]);
-            if number != own {
-                lines.push(([d[0] / long, d[1] / long], 0.5 * long, false));
-            }
-        }
-        Self { lines, rim }
-    }
-
-    /// Distance of the border at an angle, m, and which line it is (as many as there are: the rim).
-    fn border(&self, angle: f64) -> (f64, usize) {
-        let (s, c) = angle.sin_cos();
-        let mut nearest = (f64::INFINITY, 0);
-        for (number, (normal, offset, _)) in self.lines.iter().enumerate() {
-            let along = normal[0] * c + normal[1] * s;
-            if along > 0.0 && offset / along < nearest.0 {
-                nearest = (offset / along, number);
-            }
-        }
-        if let Some((centre, radius)) = self.rim {
-            let along = centre[0] * c + centre[1] * s;
-            let square = radius * radius - centre[0].powi(2) - centre[1].powi(2);
-            let distance = along + (along * along + square).sqrt();
-            if distance < nearest.0 {
-                nearest = (distance, self.lines.len());
-            }
-        }
-        nearest
-    }
-
-    /// Angles between which the border is one line: the quarters, and where another takes over.
-    fn angles(&self) -> Vec<f64> {
-        let mut out: Vec<f64> = (0..=4).map(|k| f64::from(k) * FRAC_PI_2).collect();
-        let steps = 720;
-        let step = TAU / f64::from(steps);
-        for k in 0..steps {
-            // Off the quarters, so that a corner lies within.
-            let (mut low, mut high) = ((f64::from(k) + 0.37) * step, (f64::from(k) + 1.37) * step);
-            let (first, last) = (self.border(low).1, self.border(high).1);
-            if first == last {
-                continue;
-            }
-            while high - low > 1e-14 * TAU {
-                let middle = 0.5 * (low + high);
-                if middle == low || middle == high {
-                    break;
-                }
-                if self.border(middle).1 == first {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            out.push(high % TAU);
-        }
-        out.sort_by(f64::total_cmp);
-        out.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-        out
-    }
-
-    /// The cell less a disc of `radius_m` about its core's axis, at a height.
-    fn ring(
-        &self,
-        [x, y]: [f64; 2],
-        radius_m: f64,
-        z_m: f64,
-        normal: Point,
-        joined: bool,
-    ) -> Vec<Face> {
-        let angles = self.angles();
-        // Far out the layer changes over the distance from the axis.
-        let widest = angles
-            .iter()
-            .fold(0.0_f64, |w, angle| w.max(self.border(*angle).0));
-        let graded = joined || widest > WIDE * radius_m;
-        let part = |pair: &[f64]| {
-            let [from, to] = [pair[0], pair[1]];
-            let line = self.border(0.5 * (from + to)).1;
-            let on_line = |angle: f64| {
-                let (s, c) = angle.sin_cos();
-                let (distance, _) = if line < self.lines.len() {
-                    let (n, offset, _) = self.lines[line];
-                    (offset / (n[0] * c + n[1] * s), line)
-                } else {
-                    self.border(angle)
-                };
-                [x + distance * c, y + distance * s, z_m]
-            };
-            let (a, b) = (on_line(from), on_line(to));
-            let edge = line >= self.lines.len() || self.lines[line].2;
-            let border = match self.rim {
-                Some((centre, radius)) if line == self.lines.len() => {
-                    let middle = [x + centre[0], y + centre[1], z_m];
-                    let angle = |p: Point| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-                    let first = angle(a);
-                    let mut turn = angle(b) - first;
-                    if turn < 0.0 {
-                        turn += TAU;
-                    }
-                    debug_assert!(turn < PI);
-                    Curve::arc(middle, radius, first, first + turn)
-                }
-                _ => Curve::segment(a, b),
-            };
-            let centre = [x, y, z_m];
-            Face::ruled(
-                Curve::arc(centre, radius_m, from, to),
-                border,
-                [false, false, graded, edge],
-                beyond(centre, normal),
-            )
-        };
-        angles.windows(2).map(part).collect()
     }
 }
 

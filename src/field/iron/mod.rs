@@ -14,6 +14,8 @@
 pub mod array;
 pub mod bodies;
 pub mod face;
+pub mod passive;
+pub mod plate;
 pub mod potential;
 pub mod surface;
 mod system;

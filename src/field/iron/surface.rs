@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
+use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
@@ -191,16 +192,36 @@ impl Surface {
     /// B of the layer `values`, one per node, at a place off the surface, T.
     #[must_use]
     pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
+        let mut sum = [0.0; 3];
+        self.elements(target_m, values, |node, value| {
+            add_dipole(target_m, node, value, &mut sum);
+        });
+        sum
+    }
+
+    /// The same with its gradient.
+    #[must_use]
+    pub(super) fn induced(&self, target_m: Point, values: &[f64]) -> Induced {
+        let mut sum = Induced::default();
+        self.elements(target_m, values, |node, value| {
+            let strength = MU_0_T_M_PER_A * value / (4.0 * PI);
+            sum.add_element(minus(target_m, node.place_m), node.area_m2, strength);
+        });
+        sum
+    }
+
+    /// Visits nodes with the layer `values` there, close enough to integrate what they give at a place off
+    /// the surface.
+    fn elements(&self, target_m: Point, values: &[f64], mut visit: impl FnMut(&Node, f64)) {
         let own = self.order * self.order;
         let (order, count) = (self.order + MORE_NODES, self.order);
         let mut scratch = [Vec::new(), Vec::new()];
-        let mut sum = [0.0; 3];
         for (index, panel) in self.panels.iter().enumerate() {
             let values = &values[index * own..(index + 1) * own];
             let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
             if distance > FAR * 0.5 * panel.sides_m[0].max(panel.sides_m[1]) {
                 for (value, node) in values.iter().zip(&self.nodes[index * own..]) {
-                    add_dipole(target_m, node, *value, &mut sum);
+                    visit(node, *value);
                 }
                 continue;
             }
@@ -213,11 +234,10 @@ impl Surface {
                     let value: f64 = (first.iter().zip(values.chunks_exact(count)))
                         .map(|(a, row)| a * row.iter().zip(second).map(|(v, b)| v * b).sum::<f64>())
                         .sum();
-                    add_dipole(target_m, node, value, &mut sum);
+                    visit(node, value);
                 }
             });
         }
-        sum
     }
 
     /// Dipoles that stand for the layers `values` (`[node][drive]`) at places that are `distance_m(z)` or more from

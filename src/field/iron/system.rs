@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::bodies::Iron;
 use super::surface::{Surface, mirrored};
 use fluxform_numerics::gmres::gmres;
+use fluxform_numerics::lu::Factored;
 use fluxform_numerics::vec3::norm;
 
 /// Most steps of the linear solver.
@@ -15,10 +16,23 @@ const MEAN: f64 = 0.5;
 
 /// The equations of one part of the surface, one matrix for every way to be even or odd under the mirrors.
 pub(super) struct System {
-    size: usize,
-    images: usize,
+    parities: Parities,
     /// [row][parity][column].
     entries: Vec<f64>,
+}
+
+/// The same with its matrices factorised, for many right-hand sides.
+#[derive(Debug, Clone)]
+pub(super) struct FactoredSystem {
+    parities: Parities,
+    factors: Vec<Factored>,
+}
+
+/// What the equations of every parity share.
+#[derive(Debug, Clone)]
+struct Parities {
+    size: usize,
+    images: usize,
     /// Of every parity and body whose constant it allows: nodes with their share of its area.
     constants: Vec<Vec<Vec<(usize, f64)>>>,
     /// What the unknowns are to be multiplied by to be layers.
@@ -108,26 +122,33 @@ impl System {
             })
             .collect();
         Self {
-            size,
-            images: count,
+            parities: Parities {
+                size,
+                images: count,
+                constants,
+                strengths,
+            },
             entries,
-            constants,
-            strengths,
         }
+    }
+
+    /// The rows of one parity's matrix.
+    fn rows(&self, parity: usize) -> impl IndexedParallelIterator<Item = &[f64]> {
+        let Parities { size, images, .. } = self.parities;
+        let rows = self.entries.par_chunks_exact(size * images);
+        rows.map(move |row| &row[parity * size..(parity + 1) * size])
     }
 
     fn apply(&self, parity: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
         let columns = x.ncols();
         let rows: Vec<f64> = self
-            .entries
-            .par_chunks_exact(self.size * self.images)
+            .rows(parity)
             .flat_map_iter(|row| {
-                let row = &row[parity * self.size..(parity + 1) * self.size];
                 (0..columns).map(move |column| product(row, x.column(column).as_slice()))
             })
             .collect();
-        let mut out = DMatrix::from_row_slice(self.size, columns, &rows);
-        for constant in &self.constants[parity] {
+        let mut out = DMatrix::from_row_slice(self.parities.size, columns, &rows);
+        for constant in &self.parities.constants[parity] {
             for column in 0..columns {
                 let mean: f64 = constant
                     .iter()
@@ -143,37 +164,97 @@ impl System {
 
     /// The layers for `potentials`, [image]: [node, drive].
     pub(super) fn solve(&self, potentials: &[DMatrix<f64>], tolerance: f64) -> Solution {
+        let (mut residual, mut iterations) = (0.0_f64, 0);
+        let layers = self.parities.layers(potentials, |parity, right| {
+            let outcome = gmres(&right, tolerance, MOST_STEPS, |x| self.apply(parity, x));
+            residual = residual.max(outcome.relative_residual);
+            iterations += outcome.iterations;
+            outcome.solutions
+        });
+        Solution {
+            layers,
+            residual,
+            iterations,
+        }
+    }
+
+    /// The same equations with every parity's matrix factorised; `None` where one is singular.
+    pub(super) fn factored(self) -> Option<FactoredSystem> {
+        let size = self.parities.size;
+        let factors = (0..self.parities.images)
+            .map(|parity| {
+                let mut matrix = DMatrix::zeros(size, size);
+                let columns = matrix.as_mut_slice();
+                let transposed = columns.par_chunks_mut(size.max(1)).enumerate();
+                transposed.for_each(|(column, out)| {
+                    let row_length = size * self.parities.images;
+                    let entries = &self.entries[parity * size + column..];
+                    for (value, entry) in out.iter_mut().zip(entries.iter().step_by(row_length)) {
+                        *value = *entry;
+                    }
+                });
+                for constant in &self.parities.constants[parity] {
+                    for (row, _) in constant {
+                        for (column, share) in constant {
+                            matrix[(*row, *column)] += MEAN * share;
+                        }
+                    }
+                }
+                Factored::new(matrix)
+            })
+            .collect::<Option<Vec<_>>>()?;
+        Some(FactoredSystem {
+            parities: self.parities,
+            factors,
+        })
+    }
+}
+
+impl FactoredSystem {
+    /// The layers for `potentials`, [image]: [node, drive].
+    pub(super) fn solve(&self, potentials: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        self.parities.layers(potentials, |parity, mut right| {
+            self.factors[parity].solve(&mut right);
+            right
+        })
+    }
+}
+
+impl Parities {
+    /// The layers of `potentials`, [image]: [node, drive], by what solves the equations of one parity.
+    fn layers(
+        &self,
+        potentials: &[DMatrix<f64>],
+        mut solve: impl FnMut(usize, DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Vec<DMatrix<f64>> {
         let columns = potentials[0].ncols();
         let mut layers = vec![DMatrix::zeros(self.size, columns); self.images];
-        let (mut residual, mut iterations) = (0.0_f64, 0);
+        // What rounding leaves of a drive that has none of a parity is not to be resolved.
+        let size = potentials.iter().map(DMatrix::amax).fold(0.0, f64::max);
         for parity in 0..self.images {
-            let mut rhs = DMatrix::zeros(self.size, columns);
+            let mut right = DMatrix::zeros(self.size, columns);
             for (image, potential) in potentials.iter().enumerate() {
-                rhs += potential * (sign(parity, image) / self.images as f64);
+                right += potential * (sign(parity, image) / self.images as f64);
             }
             for constant in &self.constants[parity] {
                 for column in 0..columns {
                     let mean: f64 = constant
                         .iter()
-                        .map(|(node, w)| w * rhs[(*node, column)])
+                        .map(|(node, w)| w * right[(*node, column)])
                         .sum();
                     for (node, _) in constant {
-                        rhs[(*node, column)] -= mean;
+                        right[(*node, column)] -= mean;
                     }
                 }
             }
-            // What rounding leaves of a drive that has none of this parity is not to be resolved.
-            let size = potentials.iter().map(DMatrix::amax).fold(0.0, f64::max);
-            for mut column in rhs.column_iter_mut() {
+            for mut column in right.column_iter_mut() {
                 if column.amax() < 1e-12 * size {
                     column.fill(0.0);
                 }
             }
-            let outcome = gmres(&rhs, tolerance, MOST_STEPS, |x| self.apply(parity, x));
-            residual = residual.max(outcome.relative_residual);
-            iterations += outcome.iterations;
+            let solutions = solve(parity, right);
             for (image, layer) in layers.iter_mut().enumerate() {
-                *layer += &outcome.solutions * sign(parity, image);
+                *layer += &solutions * sign(parity, image);
             }
         }
         let strengths = DVector::from_column_slice(&self.strengths);
@@ -182,11 +263,7 @@ impl System {
                 column.component_mul_assign(&strengths);
             }
         }
-        Solution {
-            layers,
-            residual,
-            iterations,
-        }
+        layers
     }
 }
 

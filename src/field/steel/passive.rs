@@ -243,7 +243,7 @@ impl PassivePull {
             relative_error: 0.0,
             coupling_share: 0.0,
         };
-        let places_m = spread(pulled);
+        let places_m = spread(pulled.positions_m, pulled.region, shape.top_m);
         let alone: Vec<_> = places_m.iter().map(|at| pull.force_n(*at)).collect();
         let coupled = pulled.coupled && pulled.positions_m.len() > 1;
         let added = if coupled {
@@ -368,15 +368,15 @@ fn couple(pulled: &Pulled, magnet: &PassiveMagnet, closest_m: f64, tolerance: f6
     )
 }
 
-/// Places of the region: over the first axes at the lowest height, then a Kronecker sequence.
-fn spread(pulled: &Pulled) -> Vec<[f64; 3]> {
-    let Region { x_m, y_m, z_m } = pulled.region;
-    let over = pulled
-        .positions_m
+/// Places of a region above steel that ends at `top_m`: over the first axes at the lowest height, then a
+/// Kronecker sequence.
+#[must_use]
+pub fn spread(positions_m: &[[f64; 2]], region: Region, top_m: f64) -> Vec<[f64; 3]> {
+    let Region { x_m, y_m, z_m } = region;
+    let over = positions_m
         .iter()
         .take(CHECKS)
         .map(|[x, y]| [x.clamp(x_m[0], x_m[1]), y.clamp(y_m[0], y_m[1]), z_m[0]]);
-    let top_m = pulled.shape.top_m;
     let within = (0..2 * CHECKS).map(|k| {
         let part = |step: f64| (0.5 + step * k as f64).fract();
         let at = |[from, to]: [f64; 2], part: f64| from + part * (to - from);
@@ -473,19 +473,7 @@ mod tests {
             z_m: [0.03, 0.09],
         };
         let positions_m = [[0.0, 0.0], [0.05, 0.03]];
-        let places = spread(&Pulled {
-            shape: CoreShape {
-                radius_m: 0.012,
-                bottom_m: -0.1,
-                top_m: 0.002,
-            },
-            relative_permeability: 1000.0,
-            positions_m: &positions_m,
-            coupled: true,
-            moment_a_m2: [0.0, 0.0, -0.9],
-            size: None,
-            region,
-        });
+        let places = spread(&positions_m, region, 0.002);
         // Over each axis, or as near as the region gets, and within.
         assert_eq!(places[..2], [[0.0, 0.02, 0.03], [0.013, 0.03, 0.03]]);
         assert_eq!(places.len(), 2 + 2 * CHECKS);

@@ -322,7 +322,7 @@ fn vary(text: &str) -> Result<(String, toml::Value), String> {
 
 /// What will be computed, said first.
 fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
-    let steel = crate::scene::cost::of_steel(design, physics.tolerance(Level::Search));
+    let steel = crate::scene::cost::of_steel(design, physics.tolerance(Level::Search, design));
     let seconds: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();
     let each = seconds
         + physics.count(Level::Search) as f64

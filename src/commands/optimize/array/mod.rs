@@ -316,9 +316,8 @@ fn levels(
 ) -> Result<Vec<LevelSummary>, RunError> {
     let best = &found.best;
     let tolerance = |level| -> Result<f64, RunError> {
-        Ok(Scene::with_tolerance(design, physics.tolerance(level))?
-            .tolerances
-            .forces)
+        let requested = physics.tolerance(level, design);
+        Ok(Scene::with_tolerance(design, requested)?.tolerances.forces)
     };
     let mut levels = vec![LevelSummary {
         level: "full",

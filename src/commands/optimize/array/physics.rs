@@ -80,6 +80,8 @@ pub type Journal = BTreeMap<String, Option<Physical>>;
 const SEARCH_SAMPLES: usize = 31;
 /// Tolerance of the forces while searching.
 pub const SEARCH_TOLERANCE: f64 = 1e-2;
+/// The same of arrays with a plate or other steel, whose finer panels take ten times as long.
+const IRON_SEARCH_TOLERANCE: f64 = 0.1;
 
 /// The shapes over arrays of any design.
 pub struct ArrayPhysics<'a> {
@@ -180,13 +182,14 @@ impl<'a> ArrayPhysics<'a> {
     }
 
     /// The tolerance of a level's forces; `None` for the default of the design's physics.
-    pub fn tolerance(&self, level: Level) -> Option<f64> {
+    pub fn tolerance(&self, level: Level, design: &Design) -> Option<f64> {
+        let coarse = if design.has_iron() {
+            IRON_SEARCH_TOLERANCE
+        } else {
+            SEARCH_TOLERANCE
+        };
         match level {
-            Level::Search => Some(
-                self.tolerance
-                    .unwrap_or(SEARCH_TOLERANCE)
-                    .max(SEARCH_TOLERANCE),
-            ),
+            Level::Search => Some(self.tolerance.unwrap_or(coarse).max(coarse)),
             Level::Full => self.tolerance,
         }
     }
@@ -201,7 +204,7 @@ impl<'a> ArrayPhysics<'a> {
         raised_m: f64,
         level: Level,
     ) -> Result<Option<Physical>, RunError> {
-        let scene = Scene::with_tolerance(design, self.tolerance(level))?;
+        let scene = Scene::with_tolerance(design, self.tolerance(level, design))?;
         let points = self.points(level);
         let raised = |points: &WantedPoints| -> Vec<[f64; 3]> {
             points

@@ -28,12 +28,32 @@ pub struct Dipole {
 }
 
 /// The steel's reaction at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Induced {
     /// B, T.
     pub field_t: [f64; 3],
     /// `[i][j]` = dB_i/dx_j, T/m.
     pub gradient_t_per_m: [[f64; 3]; 3],
+}
+
+impl Induced {
+    /// Adds `strength` (n / d^3 - 3 (n.d) d / d^5) and its gradient, `away_m` being the vector d from an element of
+    /// a layer to the point, n along its normal.
+    pub(crate) fn add_element(&mut self, away_m: [f64; 3], normal: [f64; 3], strength: f64) {
+        let (d, n) = (away_m, normal);
+        let inverse_square = 1.0 / dot(d, d);
+        let strength = strength * inverse_square * inverse_square.sqrt();
+        let along = dot(n, d);
+        for i in 0..3 {
+            self.field_t[i] += strength * (n[i] - 3.0 * along * d[i] * inverse_square);
+            for j in 0..3 {
+                let diagonal = if i == j { along } else { 0.0 };
+                let pair = n[i] * d[j] + n[j] * d[i] + diagonal
+                    - 5.0 * along * d[i] * d[j] * inverse_square;
+                self.gradient_t_per_m[i][j] -= 3.0 * strength * inverse_square * pair;
+            }
+        }
+    }
 }
 
 /// How finely one core is solved.
@@ -237,28 +257,12 @@ impl Reaction {
         dipoles
             .iter()
             .map(|dipole| {
-                let mut field = [0.0; 3];
-                let mut gradient = [[0.0; 3]; 3];
+                let mut sum = Induced::default();
                 let areas = self.areas_m2.iter().cycle();
                 for (((x, n), v), area) in self.points.iter().zip(layer.as_slice()).zip(areas) {
-                    let d = minus(*x, dipole.at_m);
-                    let inverse_square = 1.0 / dot(d, d);
-                    let strength = scale * v * area * inverse_square * inverse_square.sqrt();
-                    let along = dot(*n, d);
-                    for i in 0..3 {
-                        field[i] += strength * (n[i] - 3.0 * along * d[i] * inverse_square);
-                        for j in 0..3 {
-                            let diagonal = if i == j { along } else { 0.0 };
-                            let pair = n[i] * d[j] + n[j] * d[i] + diagonal
-                                - 5.0 * along * d[i] * d[j] * inverse_square;
-                            gradient[i][j] += 3.0 * strength * inverse_square * pair;
-                        }
-                    }
+                    sum.add_element(minus(dipole.at_m, *x), *n, scale * v * area);
                 }
-                Induced {
-                    field_t: field,
-                    gradient_t_per_m: gradient,
-                }
+                sum
             })
             .collect()
     }

@@ -1,0 +1,42 @@
+//! The lengths of a plate that a search may vary.
+
+use fluxform_design::iron::{Plate, PlateOutline};
+use fluxform_design::search::SearchKey;
+
+/// The keys of a plate, and their names in a design.
+pub(super) const KEYS: [(SearchKey, &str); 5] = [
+    (SearchKey::PlateThickness, "plate.thickness_mm"),
+    (SearchKey::PlateX, "plate.x_mm"),
+    (SearchKey::PlateY, "plate.y_mm"),
+    (SearchKey::PlateDiameter, "plate.diameter_mm"),
+    (SearchKey::PlateGap, "plate.gap_mm"),
+];
+
+/// The name of one of the [`KEYS`].
+pub(super) fn name(key: SearchKey) -> &'static str {
+    let known = KEYS.iter().find(|(known, _)| *known == key);
+    known.map_or("plate", |(_, name)| name)
+}
+
+fn length_of(plate: &mut Plate, key: SearchKey) -> Option<&mut f64> {
+    match (key, &mut plate.outline) {
+        (SearchKey::PlateThickness, _) => Some(&mut plate.thickness_m),
+        (SearchKey::PlateGap, _) => Some(&mut plate.gap_m),
+        (SearchKey::PlateX, PlateOutline::Rectangle([x, _])) => Some(x),
+        (SearchKey::PlateY, PlateOutline::Rectangle([_, y])) => Some(y),
+        (SearchKey::PlateDiameter, PlateOutline::Round(diameter)) => Some(diameter),
+        _ => None,
+    }
+}
+
+/// The length that a key names, m; `None` where a plate of this outline has none.
+pub(super) fn length_m(plate: &Plate, key: SearchKey) -> Option<f64> {
+    length_of(&mut plate.clone(), key).copied()
+}
+
+/// Sets the length that a key names, m.
+pub(super) fn set(plate: &mut Plate, key: SearchKey, value_m: f64) {
+    if let Some(length) = length_of(plate, key) {
+        *length = value_m;
+    }
+}

@@ -1,0 +1,205 @@
+//! The pull of unpowered steel of any shape on the magnet.
+//!
+//! The equations are factorised once; then every place of the magnet is one more right-hand side, the
+//! potential of its dipoles. The layer that they induce acts back on them: F = sum_k (m_k . grad) B and the energy
+//! W = -(1/2) sum_k m_k . B, whose slope F is too.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+use super::array::{MOST_ENTRIES, RESOLUTIONS, coarsest};
+use super::bodies::Iron;
+use super::face::Point;
+use super::surface::{Surface, mirrored};
+use super::system::{FactoredSystem, System};
+use crate::steel::passive::isolated::placed;
+use crate::steel::passive::magnet::{PassiveMagnet, dipoles};
+use crate::steel::passive::reaction::{Dipole, Induced};
+use fluxform_numerics::vec3::{dot, minus, norm};
+
+/// Least part of the difference from the coarsest solution that counts as error: neighbours among the
+/// [`RESOLUTIONS`] with as many panels a turn agree with each other ten times better than they are.
+const LEAST_SHARE: f64 = 0.1;
+/// Differences are known to be as much too small, between cores where their pulls nearly cancel.
+const SAFETY: f64 = 2.0;
+/// Places whose layers are solved together.
+const TOGETHER: usize = 32;
+
+/// Steel that answers to dipoles, at one resolution.
+#[derive(Debug, Clone)]
+struct Answer {
+    surface: Surface,
+    images: Vec<[f64; 2]>,
+    planes_m: [f64; 2],
+    system: FactoredSystem,
+}
+
+impl Answer {
+    /// `None` where the equations have no solution.
+    fn new(iron: &Iron, tier: usize) -> Option<Self> {
+        let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
+        let images = iron.images();
+        let system = System::new(iron, &surface, &images).factored()?;
+        Some(Self {
+            surface,
+            images,
+            planes_m: iron.planes_m,
+            system,
+        })
+    }
+
+    /// The field that the steel sends back to every dipole of `magnets`, each set acting alone.
+    fn induced(&self, magnets: &[Vec<Dipole>]) -> Vec<Vec<Induced>> {
+        fluxform_base::progress::poll();
+        let size = self.surface.size();
+        let potentials: Vec<DMatrix<f64>> = (self.images.iter())
+            .map(|signs| {
+                DMatrix::from_fn(size, magnets.len(), |node, magnet| {
+                    let node = &self.surface.nodes[node];
+                    let place_m = mirrored(node, *signs, self.planes_m).place_m;
+                    let of_dipole = |dipole: &Dipole| {
+                        let d = minus(place_m, dipole.at_m);
+                        dot(dipole.moment_a_m2, d) / (4.0 * PI * norm(d).powi(3))
+                    };
+                    magnets[magnet].iter().map(of_dipole).sum()
+                })
+            })
+            .collect();
+        let layers = self.system.solve(&potentials);
+        let of_magnet = |(number, magnet): (usize, &Vec<Dipole>)| {
+            let of_dipole = |dipole: &Dipole| self.field(dipole.at_m, &layers, number);
+            magnet.iter().map(of_dipole).collect()
+        };
+        magnets.iter().enumerate().map(of_magnet).collect()
+    }
+
+    /// The field at a place of one column of the layers, [image]: [node, column].
+    fn field(&self, at_m: Point, layers: &[DMatrix<f64>], column: usize) -> Induced {
+        let mut sum = Induced::default();
+        let [cx, cy] = self.planes_m;
+        for ([sx, sy], layer) in self.images.iter().zip(layers) {
+            let own = [cx + sx * (at_m[0] - cx), cy + sy * (at_m[1] - cy), at_m[2]];
+            let part = self.surface.induced(own, layer.column(column).as_slice());
+            let signs = [*sx, *sy, 1.0];
+            for i in 0..3 {
+                sum.field_t[i] += signs[i] * part.field_t[i];
+                for j in 0..3 {
+                    sum.gradient_t_per_m[i][j] += signs[i] * signs[j] * part.gradient_t_per_m[i][j];
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// The pull on a magnet.
+#[derive(Debug, Clone)]
+pub struct IronPull {
+    answer: Answer,
+    magnet: PassiveMagnet,
+    /// Estimated error of a force, relative to its length: twice the largest difference from the next coarser
+    /// resolution at the places that it was made for, or a tenth of that from the coarsest, and the bound of the
+    /// magnet's dipoles.
+    pub relative_error: f64,
+}
+
+impl IronPull {
+    /// The pull to an estimated error of `tolerance` at `places_m`, or as near to it as memory allows:
+    /// [`IronPull::relative_error`] says what was reached. `None` where the steel's equations have no
+    /// solution.
+    #[must_use]
+    pub fn new(
+        iron: &Iron,
+        magnet: PassiveMagnet,
+        places_m: &[Point],
+        tolerance: f64,
+    ) -> Option<Self> {
+        let wanted = coarsest(tolerance);
+        let images = iron.images().len();
+        // Entries and their factors are held at once.
+        let fits = |tier: &usize| {
+            let size = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[*tier])).size();
+            2 * images * size.pow(2) <= MOST_ENTRIES
+        };
+        let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
+        let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
+        let bound = magnet.magnet_rule(lowest_m).bound();
+        let first = wanted.min(last - 1);
+        let mut pull = Self::at_resolution(iron, magnet, first)?;
+        let coarsest = pull.forces_n(places_m);
+        let mut forces = coarsest.clone();
+        for tier in first + 1..=last {
+            pull = Self::at_resolution(iron, magnet, tier)?;
+            let finer = pull.forces_n(places_m);
+            let difference = |coarse: &[Point]| {
+                let apart = |(a, b): (&Point, &Point)| norm(minus(*a, *b)) / norm(*b);
+                coarse.iter().zip(&finer).map(apart).fold(0.0, f64::max)
+            };
+            let error = difference(&forces).max(LEAST_SHARE * difference(&coarsest));
+            pull.relative_error = SAFETY * error + bound;
+            if pull.relative_error <= tolerance {
+                break;
+            }
+            forces = finer;
+        }
+        Some(pull)
+    }
+
+    /// At one of the [`RESOLUTIONS`]; `None` where the steel's equations have no solution.
+    #[must_use]
+    pub fn at_resolution(iron: &Iron, magnet: PassiveMagnet, tier: usize) -> Option<Self> {
+        Some(Self {
+            answer: Answer::new(iron, tier)?,
+            magnet,
+            relative_error: f64::NAN,
+        })
+    }
+
+    /// Number of unknowns of one mirrored part.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.answer.surface.size()
+    }
+
+    /// The force on the magnet with its centre at each of `places_m`, N.
+    #[must_use]
+    pub fn forces_n(&self, places_m: &[Point]) -> Vec<Point> {
+        let of = |at_m: Point, back: &[Induced]| {
+            let gradients: Vec<_> = back.iter().map(|field| field.gradient_t_per_m).collect();
+            self.magnet.magnet_rule(at_m[2]).force_n(&gradients)
+        };
+        self.at_places(places_m, of)
+    }
+
+    /// The energy of the magnet with its centre at each of `places_m`, J.
+    #[must_use]
+    pub fn energies_j(&self, places_m: &[Point]) -> Vec<f64> {
+        let of = |at_m: Point, back: &[Induced]| {
+            let rule = self.magnet.rule(at_m[2]);
+            let fields = rule.iter().zip(back);
+            let along = fields.map(|(dipole, field)| dot(dipole.moment_a_m2, field.field_t));
+            -0.5 * along.sum::<f64>()
+        };
+        self.at_places(places_m, of)
+    }
+
+    /// `of` every place what the steel sends back to the magnet there.
+    fn at_places<T: Send>(
+        &self,
+        places_m: &[Point],
+        of: impl Fn(Point, &[Induced]) -> T + Sync,
+    ) -> Vec<T> {
+        let portions: Vec<Vec<T>> = places_m
+            .par_chunks(TOGETHER)
+            .map(|places_m| {
+                let magnet = |at: &Point| placed(&dipoles(&self.magnet.magnet_rule(at[2])), *at);
+                let magnets: Vec<Vec<Dipole>> = places_m.iter().map(magnet).collect();
+                let back = self.answer.induced(&magnets);
+                let places = places_m.iter().zip(&back);
+                places.map(|(at_m, back)| of(*at_m, back)).collect()
+            })
+            .collect();
+        portions.into_iter().flatten().collect()
+    }
+}

@@ -1,0 +1,166 @@
+//! The pull of a plate, other bodies and the cores with them: solved on all steel, then tabulated.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::Scene;
+use super::iron::SceneIron;
+use super::passive_table::{Layout, Table, axial_m, symmetries_of};
+use crate::RunError;
+use crate::design::MagnetModel;
+use crate::field::iron::passive::IronPull;
+use crate::field::magnet::Cylinder;
+use crate::field::steel::passive::magnet::PassiveMagnet;
+use crate::field::steel::passive::{NoPull, Region, spread};
+
+/// Share of the tolerance given to the magnet's dipoles.
+const MAGNET_SHARE: f64 = 0.1;
+/// What the table may add, relative to the tolerance.
+const TABLE_SHARE: f64 = 0.3;
+/// Attempts at the table, each with ten times less error aimed at.
+const ATTEMPTS: usize = 3;
+/// Solutions held at a time: that of points, and that of a map about them.
+const HELD: usize = 2;
+/// Step of the energy's slope, relative to the height above the steel.
+const STEP: f64 = 0.02;
+
+/// The pull over a region.
+#[derive(Debug, Clone)]
+pub struct TabulatedPull {
+    pull: IronPull,
+    table: Table,
+    top_m: f64,
+    /// Estimated error of a force, relative to its length: of the solution and of tabulating it.
+    pub relative_error: f64,
+}
+
+/// A pull with the region and the tolerance (as bits) that it was made for.
+type Held = (Region, u64, Option<Arc<TabulatedPull>>);
+
+/// The pulls that were last asked for; copies of a scene share them. Each depends on what it is for alone.
+#[derive(Debug, Clone, Default)]
+pub(super) struct HeldPulls(Arc<Mutex<Vec<Held>>>);
+
+impl HeldPulls {
+    /// The pull of `iron` over `region`, to `tolerance`; `None` where it does not answer.
+    ///
+    /// # Errors
+    /// A magnet that touches the steel; a core beside the plate.
+    pub(super) fn of(
+        &self,
+        scene: &Scene,
+        iron: &SceneIron,
+        region: Region,
+        tolerance: f64,
+    ) -> Result<Option<Arc<TabulatedPull>>, RunError> {
+        // One after the other: a second thread waits for the first one's.
+        let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let bits = tolerance.to_bits();
+        if let Some((.., pull)) = held.iter().find(|held| (held.0, held.1) == (region, bits)) {
+            return Ok(pull.clone());
+        }
+        let pull = TabulatedPull::new(scene, iron, region, tolerance)?.map(Arc::new);
+        held.truncate(HELD - 1);
+        held.insert(0, (region, bits, pull.clone()));
+        Ok(pull)
+    }
+}
+
+impl TabulatedPull {
+    fn new(
+        scene: &Scene,
+        iron: &SceneIron,
+        region: Region,
+        tolerance: f64,
+    ) -> Result<Option<Self>, RunError> {
+        let (top_m, _) = scene.steel_extent_m().unwrap_or_default();
+        let (moment_a_m2, size) = magnet_of(scene);
+        let lowest_m = region.z_m[0];
+        let magnet =
+            PassiveMagnet::new(moment_a_m2, size, top_m, lowest_m, MAGNET_SHARE * tolerance)
+                .map_err(|fault| too_close(region, fault))?;
+        let axes = &scene.design.array.positions_m;
+        let places_m = spread(axes, region, top_m);
+        let (_, bodies) = iron.bodies(scene)?;
+        let Some(pull) = IronPull::new(&bodies, magnet, &places_m, tolerance) else {
+            return Ok(None);
+        };
+        let sure = pull.forces_n(&places_m);
+        let ranges = [region.x_m, region.y_m, region.z_m];
+        let turns = symmetries_of(scene, ranges);
+        let mut aim = TABLE_SHARE * tolerance;
+        let mut best: Option<(f64, Table)> = None;
+        for _ in 0..ATTEMPTS {
+            let layout = Layout::new(ranges, [top_m, axial_m(scene)], &turns, aim);
+            let table = layout.filled(|places_m| {
+                let forces = pull.forces_n(places_m);
+                forces.into_iter().map(|force| force[2]).collect()
+            });
+            let error = places_m.iter().zip(&sure).map(|(at, sure)| {
+                let length = sure.iter().map(|f| f * f).sum::<f64>().sqrt();
+                (table.at(*at) - sure[2]).abs() / length
+            });
+            let error = error.fold(0.0, f64::max);
+            if best.as_ref().is_none_or(|(least, _)| error < *least) {
+                best = Some((error, table));
+            }
+            if error <= TABLE_SHARE * tolerance {
+                break;
+            }
+            aim *= 0.1;
+        }
+        Ok(best.map(|(error, table)| Self {
+            relative_error: pull.relative_error + error,
+            pull,
+            table,
+            top_m,
+        }))
+    }
+
+    /// Force at one place, N, solved for it.
+    #[must_use]
+    pub fn force_n(&self, at_m: [f64; 3]) -> [f64; 3] {
+        self.pull.forces_n(&[at_m])[0]
+    }
+
+    /// Vertical forces, N, by the table.
+    #[must_use]
+    pub fn forces_z_n(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
+        places_m.iter().map(|at| self.table.at(*at)).collect()
+    }
+
+    /// The same by another route: the slope of the magnet's energy, solved for every place.
+    #[must_use]
+    pub fn slopes_z_n(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
+        const STEPS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+        let step_m = |at: &[f64; 3]| STEP * (at[2] - self.top_m);
+        let moved = |at: &[f64; 3]| STEPS.map(|k| [at[0], at[1], at[2] + k * step_m(at)]);
+        let places: Vec<[f64; 3]> = places_m.iter().flat_map(moved).collect();
+        let energies = self.pull.energies_j(&places);
+        let slope = |(w, at): (&[f64], &[f64; 3])| {
+            -(w[0] - 8.0 * w[1] + 8.0 * w[2] - w[3]) / (12.0 * step_m(at))
+        };
+        energies
+            .chunks_exact(STEPS.len())
+            .zip(places_m)
+            .map(slope)
+            .collect()
+    }
+}
+
+/// Moment and, where it is not a point, size of the magnet.
+pub(super) fn magnet_of(scene: &Scene) -> ([f64; 3], Option<Cylinder>) {
+    let magnet = &scene.design.magnet;
+    let size = (magnet.model == MagnetModel::Cylinder).then_some(Cylinder {
+        diameter_m: magnet.diameter_m,
+        length_m: magnet.length_m,
+    });
+    (scene.moment_a_m2, size)
+}
+
+pub(super) fn too_close(region: Region, fault: NoPull) -> RunError {
+    RunError::Input(format!(
+        "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet or the \
+         workspace",
+        region.z_m[0] * 1e3
+    ))
+}
