@@ -4,7 +4,8 @@
 usage: python3 scripts/plate_accuracy.py [PROGRAM] [TOLERANCE ...]
 
 Inductances of the middle, a side and a corner coil; the force constants of four shapes relative to no plate; CPU time
-(all threads, user and system) and peak memory of the slowest command.
+(all threads, user and system) and peak memory of the slowest command. The last row is that of three-dimensional finite
+elements, tests/oracles/steel/plate.json, with the largest change by a lower order, another level or a larger ball.
 """
 import json
 import resource
@@ -54,6 +55,17 @@ def main():
             error = evaluated["accuracy"]["mutual_inductance"]["estimate"]
             cells += [f"{slowest_s:.0f}", f"{memory_mb:.0f}", f"{error:.0e}"]
             print("| " + " | ".join(cells) + " |", flush=True)
+    print(elements())
+
+
+def elements():
+    """The row of the committed finite elements."""
+    oracle = json.loads((ROOT / "tests" / "oracles" / "steel" / "plate.json").read_text())
+    best = oracle["meshes"]["best"]
+    inductances = " / ".join(f"{best['inductance_h'][name]:.4f}" for name in ("centre", "side", "corner"))
+    ratios = " | ".join(f"{oracle['lambda_jnd'][shape]['ratio']:.4f}" for shape in SHAPES)
+    change = max(max(changes.values()) for changes in oracle["changes"].values())
+    return f"| finite elements | {inductances} | {ratios} | {best['cpu_s']:.0f} | | {change:.0e} |"
 
 
 main()

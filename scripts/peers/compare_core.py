@@ -64,7 +64,7 @@ def main():
     if numbers:
         gradient = numbers["target"]["gradient_t_per_m_per_a"]
         inductance = numbers["coil"]["inductance_h"]
-        version = run(fluxform, "--version")[0].split()[-1]
+        version = run(fluxform, "--version")[0].split()[1]
         print(f"| fluxform {version} | whole command | {seconds:.4f} | {gradient!r} | {inductance!r} |")
     print(
         f"| NGSolve {peer['ngsolve']}, {peer['unknowns']} unknowns | mesh, solution, evaluation "

@@ -51,7 +51,7 @@ def main():
     python = peer_python()
     run("cargo", "build", "--release", "--locked", "--quiet")
     fluxform = ROOT / "target" / "release" / "fluxform"
-    version = run(fluxform, "--version")[0].split()[-1]
+    version = run(fluxform, "--version")[0].split()[1]
     with tempfile.TemporaryDirectory() as folder:
         reference, ours = Path(folder, "reference"), Path(folder, "ours")
         run(

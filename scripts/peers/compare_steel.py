@@ -104,7 +104,7 @@ def draw(rows, path):
     import matplotlib.pyplot as plt
 
     matplotlib.rcParams["svg.hashsalt"] = "fluxform"
-    figure, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    figure, axes = plt.subplots(figsize=(6.4, 4.8), layout="constrained")
     for program, marker in zip(dict.fromkeys(row["program"] for row in rows), "os^"):
         own = [row for row in rows if row["program"] == program]
         axes.loglog([row["cpu_s"] for row in own], [row["error"] for row in own], marker=marker, label=program)
@@ -112,8 +112,13 @@ def draw(rows, path):
     axes.set_ylabel("largest error of dB_z/dz, of the driven coil's own")
     axes.set_title("Nine cores on a plate, 30 mm above the coils")
     axes.grid(True, which="both", alpha=0.3)
-    axes.legend(fontsize="small")
+    figure.legend(loc="outside lower center", fontsize="small")
     figure.savefig(path, metadata={"Date": None})
+
+
+def brief(error):
+    mantissa, exponent = f"{error:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def main():
@@ -135,7 +140,7 @@ def main():
     print("|---|---|---|---|---|")
     for row in rows:
         unknowns = row["unknowns"] or ""
-        print(f"| {row['program']} | {row['knob']} | {unknowns} | {row['cpu_s']:.1f} | {row['error']:.1e} |")
+        print(f"| {row['program']} | {row['knob']} | {unknowns} | {row['cpu_s']:.1f} | {brief(row['error'])} |")
 
 
 if __name__ == "__main__":

@@ -172,8 +172,8 @@ fn a_large_thick_plate_gives_the_image_of_the_coil() {
     assert!((found / image - 1.0).abs() < 5e-3, "{found} {image}");
 }
 
-/// `tests/oracles/steel/plate.py`: finite elements in three dimensions, to 2e-4. The coarsest panels; without the plate -0.472 T/m/A above the
-/// driven centre and 0.213 H.
+/// Against `tests/oracles/steel/plate.py`, finite elements in three dimensions to 2e-4, on the coarsest panels: finer ones
+/// agree to 1e-4 (`scripts/peers/compare_steel.py`). Without the plate it is -0.472 T/m/A above the driven centre and 0.213 H.
 #[test]
 fn a_plate_joins_the_cores_and_closes_the_flux() {
     let positions_m = grid();

@@ -291,7 +291,7 @@ def shapes():
     """Constraint points of the four shapes."""
     plan = np.linspace(-0.05, 0.05, 61)
     px, py = (a.ravel() for a in np.meshgrid(plan, plan, indexing="ij"))
-    r = np.hypot(px, py)
+    r = np.round(np.hypot(px, py), 12)  # the rim's points count
     heights = {
         "flat": np.full_like(px, 0.05),
         "half_sphere": np.where(r <= 0.05, 0.03 + np.sqrt(np.maximum(0.05**2 - r**2, 0)), np.nan),
