@@ -94,6 +94,50 @@ const CASES: &[(&str, &[&str])] = &[
         &["lambda", "air.toml", "shapes/flat.toml"],
     ),
     (
+        "path and worst point, 225 coils",
+        &["lambda", "air225.toml", "wide.toml"],
+    ),
+    (
+        "steel, points and map, 225 cores",
+        &[
+            "calibrate",
+            "cores225.toml",
+            "wide.toml",
+            "--out",
+            "x",
+            "--no-cache",
+            "--force",
+        ],
+    ),
+    ("steel, cores on a plate", &["evaluate", "plate.toml"]),
+    (
+        "map, cores on a plate",
+        &["map", "plate.toml", "--out", "y", "--force"],
+    ),
+    (
+        "calibrate to an error",
+        &[
+            "calibrate",
+            "designs/seed.toml",
+            "shapes/half_sphere.toml",
+            "--error",
+            "0.1%",
+            "--out",
+            "z",
+            "--no-cache",
+            "--force",
+        ],
+    ),
+    (
+        "optimize an array",
+        &[
+            "optimize",
+            "designs/seed_search.toml",
+            "--for",
+            "shapes/flat.toml",
+        ],
+    ),
+    (
         "calibrate, cored",
         &[
             "calibrate",
@@ -201,6 +245,11 @@ const CASES: &[(&str, &[&str])] = &[
 
 /// A folder whose lock is held all the time.
 const LOCKED: &str = "locked";
+/// A plane as wide as 15 coils in a row.
+const WIDE: &str = "name = \"wide\"\nprimitive = \"flat\"\nside_mm = 700.0\nheight_mm = 50.0\n\
+                    [points]\nx_mm = [-350.0, 350.0, 61]\ny_mm = [-350.0, 350.0, 61]\n";
+/// A plate under the cores of the seed.
+const PLATE: &str = "[plate]\nthickness_mm = 3.0\nx_mm = 160.0\ny_mm = 160.0\ngap_mm = 0.5\n";
 /// Bodies of the STEP file.
 const BODIES: usize = 600;
 
@@ -343,6 +392,10 @@ fn prepare(binary: &str, folder: &Path) {
     write("many.toml", &array(&seed, 20));
     write("air.toml", &array(&air, 8));
     write("fine.toml", &fine);
+    write("air225.toml", &array(&air, 15));
+    write("cores225.toml", &array(&seed, 15));
+    write("wide.toml", WIDE);
+    write("plate.toml", &format!("{seed}\n{PLATE}"));
     write("points.csv", "x_m,y_m,z_m\n0.001,0.002,0.03\n");
     let mut walk = String::from("t_s,x_m,y_m,z_m\n");
     for k in 0..1_000_000 {

@@ -265,6 +265,50 @@ fn a_signal_ends_points_paths_searches_and_stages() {
     stops(&place, &["optimize", "designs/seed.toml"], &[300, 900]);
 }
 
+/// What takes longest: hundreds of coils, steel of any shape, the search of an array, points to an error.
+#[test]
+fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
+    let place = Place::new();
+    let wide = "name = \"wide\"\nprimitive = \"flat\"\nside_mm = 700.0\nheight_mm = 50.0\n[points]\n\
+                x_mm = [-350.0, 350.0, 61]\ny_mm = [-350.0, 350.0, 61]\n";
+    place.write("wide.toml", wide);
+    place.write("air.toml", &array(15, "", 100.0));
+    place.write("cores.toml", &array(15, "[core]", 100.0));
+    let plate = "[plate]\nthickness_mm = 3.0\nx_mm = 160.0\ny_mm = 160.0\ngap_mm = 0.5\n";
+    place.write("plate.toml", &array(3, &format!("[core]\n{plate}"), 100.0));
+    for args in [
+        &["lambda", "air.toml", "wide.toml"][..],
+        &["calibrate", "cores.toml", "wide.toml", "--out", "cores"],
+        &["evaluate", "plate.toml"],
+        &["map", "plate.toml", "--out", "map"],
+        &["calibrate", "plate.toml", "shapes/flat.toml", "--out", "on"],
+        &[
+            "optimize",
+            "designs/seed_search.toml",
+            "--for",
+            "shapes/flat.toml",
+        ],
+        &[
+            "calibrate",
+            "designs/seed.toml",
+            "shapes/half_sphere.toml",
+            "--error",
+            "0.1%",
+            "--out",
+            "error",
+        ],
+        &[
+            "bench",
+            "designs/seed.toml",
+            "shapes/wedge.toml",
+            "--out",
+            "bench",
+        ],
+    ] {
+        stops(&place, args, &[300, 1300]);
+    }
+}
+
 #[test]
 fn a_signal_ends_what_reads_a_bundle() {
     let place = Place::new();

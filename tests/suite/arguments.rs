@@ -59,7 +59,7 @@ pub struct Arguments {
     #[arg(long)]
     scaling: bool,
     /// Of --scaling measure this law alone; may be repeated. The others stay as the folder has them
-    #[arg(long, value_name = "STAGE:AXIS", requires = "scaling", value_parser = law_names())]
+    #[arg(long, value_name = "STAGE:AXIS", requires = "scaling", value_parser = law_name)]
     law: Vec<String>,
     /// Run the stability catalogue; with --quick the part of it that every change runs
     #[arg(long, conflicts_with_all = ["stage", "peers", "scaling"])]
@@ -112,8 +112,12 @@ fn stage_names() -> PossibleValuesParser {
     PossibleValuesParser::new(STAGES.map(|stage| stage.name))
 }
 
-fn law_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(scaling::LAWS.map(|law| law.name()))
+fn law_name(text: &str) -> Result<String, String> {
+    let names: Vec<String> = scaling::LAWS.iter().map(scaling::Spec::name).collect();
+    if names.iter().any(|name| name == text) {
+        return Ok(text.to_owned());
+    }
+    Err(format!("expected one of {}", names.join("; ")))
 }
 
 impl Program for Arguments {

@@ -3,6 +3,10 @@
 use std::fmt::Write;
 
 use crate::file::{BenchFile, Curve, Law, Row, StageCurves};
+use crate::scaling::THREADS;
+
+/// Above this ratio of the time by the clock to processor time of one thread a machine had other work.
+const BUSY: f64 = 1.1;
 
 /// `summary.md`.
 #[must_use]
@@ -242,12 +246,11 @@ fn laws(laws: &[Law]) -> String {
         });
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {:.2} +- {:.2} | {:.2} +- {:.2} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {:.2} +- {:.2} | {} | {} | {} |",
             law.stage,
             law.axis,
             sizes.join(", "),
-            law.seconds_slope,
-            law.seconds_slope_error,
+            growth(law),
             law.memory_slope,
             law.memory_slope_error,
             plain(law.seed_size),
@@ -256,6 +259,23 @@ fn laws(laws: &[Law]) -> String {
         );
     }
     text
+}
+
+/// The exponent of the time; of threads how many times faster the most are than one by the clock, where the
+/// machine had time for one.
+fn growth(law: &Law) -> String {
+    let one = law.sizes.iter().find(|row| row.threads == 1);
+    match (law.axis.as_str(), one, law.sizes.last()) {
+        (THREADS, Some(one), _) if one.elapsed_s > BUSY * one.seconds => {
+            "(machine busy)".to_owned()
+        }
+        (THREADS, Some(one), Some(most)) => format!(
+            "{} threads {} times as fast",
+            most.threads,
+            three(one.elapsed_s / most.elapsed_s)
+        ),
+        _ => format!("{:.2} +- {:.2}", law.seconds_slope, law.seconds_slope_error),
+    }
 }
 
 fn knob(row: &Row) -> String {

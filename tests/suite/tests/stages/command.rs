@@ -160,6 +160,39 @@ fn one_row_of_the_scaling_is_a_process_of_its_own() {
 }
 
 #[test]
+fn laws_that_are_not_measured_again_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let measured = |law: &str| {
+        let part = [
+            "--quick",
+            "--stage",
+            "inductance",
+            "--scaling",
+            "--law",
+            law,
+        ];
+        json(&bench(
+            folder.path(),
+            &[&part[..], &["--format", "json"]].concat(),
+        ))["scaling"]
+            .clone()
+    };
+    let points = measured("lambda-path:points");
+    let both = measured("inductance:coils");
+    let laws = both.as_array().unwrap();
+    // In the order of a whole run, whichever was measured last.
+    assert_eq!(
+        [&laws[0]["stage"], &laws[1]["stage"]],
+        ["inductance", "lambda-path"]
+    );
+    assert_eq!((laws.len(), &laws[1]), (2, &points[0]));
+    let refused = bench(folder.path(), &["--scaling", "--law", "moons:points"]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    let without = bench(folder.path(), &["--law", "inductance:coils"]);
+    assert_eq!(without.status.code(), Some(2), "{without:?}");
+}
+
+#[test]
 fn help_names_every_mode_and_its_examples_work() {
     let folder = tempfile::tempdir().unwrap();
     let help = bench(folder.path(), &["--help"]);
