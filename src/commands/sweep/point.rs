@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::RunError;
 use crate::bundle::sweep::{ArrayRow, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
 use crate::coil::optimum::Ending;
-use crate::commands::optimize::array::physics::{ArrayPhysics, Constant};
+use crate::commands::optimize::array::physics::{Aim, ArrayPhysics};
 use crate::commands::optimize::array::{
     ArrayEnding, ArrayRequest, optimize_array, settling_in_array,
 };
@@ -18,7 +18,6 @@ use crate::scene::Scene;
 use crate::scene::iron::without_iron;
 use crate::scene::rated::{CircuitSummary, Rated};
 use crate::scene::sources::ShapeSource;
-use crate::units::FORCE_JND;
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
@@ -107,8 +106,7 @@ impl Sweep<'_> {
     fn array(&self, design: Design, text: String, index: u64) -> Result<Computed, RunError> {
         let tolerance = self.plan.tolerance;
         let (design, text) = settling_in_array(design, text, self.path, tolerance)?;
-        let constant = Constant::default();
-        let physics = ArrayPhysics::new(&self.shapes, (constant, FORCE_JND), tolerance, &Silent)?;
+        let physics = ArrayPhysics::new(&self.shapes, Aim::default(), tolerance, &Silent)?;
         let default = Settings::default();
         let settings = Settings {
             seed: self.plan.seed_at(index),
@@ -120,11 +118,10 @@ impl Sweep<'_> {
             ..default
         };
         let request = ArrayRequest {
-            constant,
-            jnd_weight: FORCE_JND,
             shares: Some(vec![1.0; self.shapes.len()]),
             settings,
             tolerance,
+            every_count: false,
         };
         let document = Document {
             design: &design,
@@ -160,7 +157,7 @@ impl Sweep<'_> {
             lambda_n_per_m: found
                 .shapes
                 .iter()
-                .map(|shape| shape.lambda_n_per_m)
+                .filter_map(|shape| shape.lambda_n_per_m)
                 .collect(),
             coils: best.array.positions_m.len() as u64,
             evaluations: found.evaluations as u64,
