@@ -130,6 +130,9 @@ impl SearchSpace {
     }
 }
 
+const TWICE: &str = "a choice is there twice";
+const ONCE: &str = "give each value once";
+
 const COUNT: Rule = Rule::any("").bound(Bound::AtLeast(1.0));
 
 /// Reads the section.
@@ -216,6 +219,10 @@ pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
         .iter()
         .map(|size| size.value)
         .collect();
+    let mut others = space.magnets_mm.iter().enumerate();
+    if others.any(|(index, size)| space.magnets_mm[..index].contains(size)) {
+        magnet.fault("size_mm", TWICE, ONCE);
+    }
     magnet.finish();
     let mut shapes = s.section("shapes");
     add(
@@ -336,7 +343,7 @@ fn add(
     }
     list.sort_by(f64::total_cmp);
     if list.windows(2).any(|pair| pair[0] == pair[1]) {
-        s.fault(name, "a choice is there twice", "give each value once");
+        s.fault(name, TWICE, ONCE);
     }
     space.keys.push((key, SearchValues::Listed(list)));
 }

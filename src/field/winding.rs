@@ -147,6 +147,35 @@ impl Winding {
         radial.hypot(z_m.max(-self.length_m - z_m).max(0.0))
     }
 
+    /// No derivative of third order along straight lines, of a component of B per ampere, is larger at
+    /// heights `z_m` > 0 above the top face and radii between `r_m`, T/m^3/A.
+    ///
+    /// B is mu_0/(4 pi) int dl x R/R^3, a sum of first derivatives of 1/R, and the fourth derivatives of a
+    /// harmonic 1/R along any four unit vectors are at most 4!/R^5: Legendre polynomials are at most 1, and
+    /// the largest value of a symmetric form is one with equal vectors. The wire is taken at the least distance
+    /// of the section, slice by slice, so the bound is a few times the largest derivative.
+    #[must_use]
+    pub fn third_derivative_bound(&self, [r_low_m, r_high_m]: [f64; 2], z_m: f64) -> f64 {
+        const SLICE: f64 = 1.1;
+        if z_m <= 0.0 {
+            return f64::INFINITY;
+        }
+        let apart_m = (self.inner_radius_m - r_high_m)
+            .max(r_low_m - self.outer_radius_m)
+            .max(0.0);
+        let bottom_m = z_m + self.length_m;
+        let (mut top_m, mut sum) = (z_m, 0.0);
+        while top_m < bottom_m {
+            let next_m = (SLICE * top_m).min(bottom_m);
+            let square = top_m * top_m + apart_m * apart_m;
+            sum += (next_m - top_m) / (square * square * square.sqrt());
+            top_m = next_m;
+        }
+        let wire_per_m =
+            PI * (self.inner_radius_m + self.outer_radius_m) * self.turns / self.length_m;
+        MU_0_T_M_PER_A / (4.0 * PI) * 24.0 * wire_per_m * sum
+    }
+
     /// Field and all gradient components per ampere at radius `r_m` >= 0 and height `z_m` above
     /// the top face, anywhere: outside, in the bore, inside the conductor.
     ///

@@ -53,6 +53,7 @@ mod basis;
 mod certificate;
 mod cone;
 mod criteria;
+pub mod enclosure;
 pub mod feedback;
 mod given;
 mod homotopy;
@@ -79,6 +80,6 @@ pub use fluxform_base::force_constant::{Criterion, ForceConstants, Jnd, NamedCon
 pub use given::{GivenForce, lowest_requested_m};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
-pub use solve::{OperatingPoint, Precision, Solution, Status, constant, solve};
+pub use solve::{OperatingPoint, Precision, Solution, Status, constant, relative_error, solve};
 pub use vector_allocation::{MET as VECTOR_MET, VectorAllocation, VectorAllocator};
 pub use wiring::{Rewired, Wiring, WiringError};

@@ -88,14 +88,14 @@ pub struct Solution {
 }
 
 /// Both paths of one reduced problem.
-struct Solved {
-    reduced: Reduced,
+pub(super) struct Solved {
+    pub reduced: Reduced,
     model: Model,
-    bounds: Bounds,
+    pub bounds: Bounds,
     /// The bounds of `unlimited`.
     free_bounds: Bounds,
-    limited: Trace,
-    unlimited: Trace,
+    pub limited: Trace,
+    pub unlimited: Trace,
     /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
     error: f64,
     flaw: f64,
@@ -165,7 +165,17 @@ impl Solved {
         }
     }
 
-    fn reliable(&self) -> bool {
+    /// e* and e_0 side by side.
+    pub fn comparison(&self) -> Comparison<'_> {
+        let heights = self.reduced.heights();
+        Comparison {
+            limited: &self.limited,
+            unlimited: &self.unlimited,
+            mean_square: Num::dot(heights, heights),
+        }
+    }
+
+    pub fn reliable(&self) -> bool {
         self.limited.complete && self.unlimited.complete && self.flaw <= FLAW
     }
 
@@ -259,12 +269,7 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
     let (solved, rank, _) = solve_paths(problem, &largest);
-    let heights = solved.reduced.heights();
-    let comparison = Comparison {
-        limited: &solved.limited,
-        unlimited: &solved.unlimited,
-        mean_square: Num::dot(heights, heights),
-    };
+    let comparison = solved.comparison();
     if status(&solved, &comparison) == Status::NothingRendered {
         return Ok(None);
     }
@@ -280,8 +285,29 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     })
 }
 
+/// The root of the mean square error at a force constant above zero, relative to that of the requested force, as
+/// [`solve`] has it; `None` where no force is requested or rendered.
+///
+/// # Errors
+/// As [`solve`].
+pub fn relative_error(
+    problem: &ForceProblem,
+    lambda_n_per_m: f64,
+) -> Result<Option<f64>, ProblemError> {
+    problem.validate(&Settings::default())?;
+    let largest = largest_entries(problem);
+    problem.comparable(&largest)?;
+    let (solved, _, _) = solve_paths(problem, &largest);
+    if status(&solved, &solved.comparison()) != Status::Solved {
+        return Ok(None);
+    }
+    let path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
+    let requested_n = lambda_n_per_m * problem.rms_height_m();
+    Ok(Some(path.error_n2(lambda_n_per_m).sqrt() / requested_n))
+}
+
 /// Both paths, the number of independent columns, and the arithmetic of their reduction.
-fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, usize, Precision) {
+pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, usize, Precision) {
     let coils = problem.coils();
     let mut condition = None;
     if problem.points() >= coils && !largest[..coils].contains(&0.0) {
@@ -378,12 +404,7 @@ fn finish<T: Real>(
     rank: usize,
     precision: Precision,
 ) -> Solution {
-    let heights = solved.reduced.heights();
-    let comparison = Comparison {
-        limited: &solved.limited,
-        unlimited: &solved.unlimited,
-        mean_square: Num::dot(heights, heights),
-    };
+    let comparison = solved.comparison();
     let (linear, jnd) = first_and_jnd(problem, settings, solved, &comparison, rank);
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
     let status = status(solved, &comparison);

@@ -38,7 +38,7 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     let place = Place::new();
     let result = place.run(&search(&["--out", "best.toml"])).ends(0).json();
     assert_eq!(result["status"], "done");
-    assert_eq!(result["certificate"]["kind"], "multistart");
+    assert_eq!(result["certificate"]["kind"], "local");
     assert!(number(&result, "gain") > 1.0, "{}", result["gain"]);
     for limit in result["limits"].as_object().unwrap().values() {
         assert_eq!(limit["met"], true, "{limit}");
@@ -118,7 +118,7 @@ fn a_settling_limit_that_the_given_coil_misses_does_not_fail_a_search_of_the_pit
     assert!(result["limits"]["array_settling_s"].is_null());
 }
 
-/// A known answer: the pitch alone against a fine scan.
+/// A known answer: the pitch alone against a fine scan, which the proven bound encloses.
 #[test]
 fn the_pitch_alone_is_that_of_a_fine_scan() {
     let place = Place::new();
@@ -155,6 +155,97 @@ fn the_pitch_alone_is_that_of_a_fine_scan() {
     assert!(found > scanned * (1.0 - 1e-4), "{found} {scanned}");
     let exact = at(number(&result, "values/array.pitch_mm"));
     assert!((found / exact - 1.0).abs() < 1e-9, "{found} {exact}");
+    assert_eq!(result["certificate"]["kind"], "global");
+    let before = result["shapes"][0]["lambda_before_n_per_m"]
+        .as_f64()
+        .unwrap();
+    let bound = number(&result, "certificate/upper_bound");
+    assert!(bound >= scanned.max(found) / before, "{bound} {scanned}");
+    let gap = number(&result, "certificate/gap");
+    assert!(
+        (bound / number(&result, "gain") - 1.0 - gap).abs() < 1e-12 && gap < 3e-3,
+        "{gap}"
+    );
+}
+
+/// Few whole values: all of them are computed, and the best is the best of all.
+#[test]
+fn numbers_of_rows_alone_are_all_computed() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 7.0");
+    place.write("air.toml", &text);
+    let mut arguments = vec![
+        "optimize",
+        "air.toml",
+        "--for",
+        FLAT,
+        "--vary",
+        "array.rows=1,2,3",
+    ];
+    arguments.extend(["--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    assert_eq!(result["certificate"]["kind"], "exhaustive");
+    let choices = result["choices"].as_array().unwrap();
+    let gains: Vec<f64> = choices.iter().map(|c| number(c, "objective")).collect();
+    assert_eq!(gains.len(), 3);
+    assert!(gains[1..].iter().all(|gain| gains[0] >= *gain), "{gains:?}");
+}
+
+/// The error at a given force constant, as `lambda --at` states it.
+#[test]
+fn the_least_error_at_a_force_constant() {
+    let place = Place::new();
+    let more = [
+        "--constant",
+        "error",
+        "--lambda",
+        "1.3",
+        "--out",
+        "best.toml",
+    ];
+    let result = place.run(&search(&more)).ends(0).json();
+    assert!(number(&result, "gain") > 1.0, "{}", result["gain"]);
+    for (design, key) in [
+        (SEED, "relative_error_before"),
+        ("best.toml", "relative_error"),
+    ] {
+        let lambda = place
+            .run(&["lambda", design, FLAT, "--at", "1.3", "--format", "json"])
+            .ends(0)
+            .json();
+        let stated = result["shapes"][0][key].as_f64().unwrap();
+        // The plate is 50 mm high everywhere.
+        let exact = number(&lambda, "at/rms_error_n") / (1.3 * 0.05);
+        assert!(
+            (stated / exact - 1.0).abs() < 1e-9,
+            "{key}: {stated} {exact}"
+        );
+    }
+    for wrong in [&["--constant", "error"][..], &["--lambda", "1.3"]] {
+        let run = place.run(&search(wrong)).ends(2);
+        assert!(run.err.contains("go together"), "{}", run.err);
+    }
+}
+
+/// Lowered into the coils, a shape of height next to nothing had a force constant of millions.
+#[test]
+fn regression_shapes_were_lowered_into_the_coils() {
+    let place = Place::new();
+    let mut arguments = vec![
+        "optimize",
+        SEED,
+        "--for",
+        FLAT,
+        "--vary",
+        "shapes.height_mm=-60:0",
+    ];
+    arguments.extend(["--evaluations", "12", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    // The plate lies at 50 mm, the workspace begins at 10 mm.
+    let height = number(&result, "values/shapes.height_mm");
+    assert!((-40.0..-39.0).contains(&height), "{height}");
 }
 
 /// A known answer: mirrored shapes ask for mirrored arrays.
@@ -287,13 +378,19 @@ fn what_cannot_be_searched_is_said_before_anything_is_computed() {
         ("coil.inner_diameter_mm=37.5:37.9", "no winding fits"),
         ("core.below_mm=0:20", "no core"),
         ("array.pich_mm=40:60", "did you mean pitch_mm"),
-        ("array.pitch_mm=20:30", "pitch_m"),
+        ("array.pitch_mm=20:30", "meets the array's pitch <= 30 mm;"),
     ] {
         let run = place
             .run(&["optimize", SEED, "--for", FLAT, "--vary", vary])
             .ends(3);
         assert!(run.err.contains(said), "{vary}: {}", run.err);
     }
+    let text = place.text(SEED) + "[search]\nmagnet.size_mm = [[10.0, 10.0], [10.0, 10.0]]\n";
+    place.write("magnets.toml", &text);
+    let run = place
+        .run(&["optimize", "magnets.toml", "--for", FLAT])
+        .ends(3);
+    assert!(run.err.contains("there twice"), "{}", run.err);
     let twice = ["--vary", "array.columns=2,3", "--vary", "array.columns=3,4"];
     let run = place
         .run(&[&["optimize", SEED, "--for", FLAT][..], &twice].concat())
@@ -315,7 +412,8 @@ fn what_cannot_be_searched_is_said_before_anything_is_computed() {
         ])
         .ends(3);
     assert!(
-        run.err.contains("resistance_ohm <= 0.0005") && run.err.contains("nearest, layers ="),
+        run.err.contains("meets resistance <= 0.0005 ohm;")
+            && run.err.contains("nearest, layers ="),
         "{}",
         run.err
     );

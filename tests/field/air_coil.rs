@@ -334,3 +334,34 @@ fn a_point_beyond_all_measure_has_a_field() {
         );
     }
 }
+
+/// Second differences of dB_z/dz along slanted lines.
+#[test]
+fn no_third_derivative_exceeds_its_bound_and_the_bound_is_not_idle() {
+    let winding = Winding {
+        inner_radius_m: 0.0123,
+        outer_radius_m: 0.0191,
+        length_m: 0.0977,
+        turns: 1313.0,
+    };
+    let step_m = 2e-4;
+    let dbz_dz = |x: f64, y: f64, z: f64| winding.field(x.hypot(y), z).expect("in air").dbz_dz;
+    let mut tightest = f64::INFINITY;
+    for z_m in [0.013, 0.03, 0.071] {
+        for x_m in [0.0, 0.007, 0.016, 0.024, 0.045] {
+            let bound = winding.third_derivative_bound([x_m - step_m, x_m + step_m], z_m - step_m);
+            for [a, b, c] in [
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [0.6, 0.0, 0.8],
+                [0.36, 0.48, 0.8],
+            ] {
+                let at = |t: f64| dbz_dz(x_m + a * t, b * t, z_m + c * t);
+                let second = (at(step_m) - 2.0 * at(0.0) + at(-step_m)) / (step_m * step_m);
+                assert!(second.abs() <= bound, "{x_m} {z_m}: {second} {bound}");
+                tightest = tightest.min(bound / second.abs());
+            }
+        }
+    }
+    assert!(tightest < 3.0, "{tightest}");
+}

@@ -27,8 +27,8 @@ pub enum Level {
 /// What is computed of a design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Physical {
-    /// The chosen force constant of every shape, N/m, above 0.
-    pub lambda_n_per_m: Vec<f64>,
+    /// What is made large of every shape, above 0: its force constant, N/m, or the inverse of an error.
+    pub merits: Vec<f64>,
     /// Self inductance of a coil alone, H.
     pub inductance_h: f64,
     /// That of the array's slowest pattern of currents, H.
@@ -56,21 +56,21 @@ pub trait Physics: Sync {
 
 impl Physical {
     fn outputs(&self) -> Vec<f64> {
-        let lambdas = self.lambda_n_per_m.iter().copied();
+        let merits = self.merits.iter().copied();
         let others = [self.inductance_h, self.array_inductance_h];
-        lambdas
+        merits
             .chain(others)
             .chain(self.core_field_t)
             .map(f64::ln)
             .collect()
     }
 
-    /// From the logarithms of `shapes` force constants, two inductances and a flux density.
+    /// From the logarithms of `shapes` merits, two inductances and a flux density.
     #[must_use]
     pub fn of_outputs(outputs: &[f64], shapes: usize) -> Option<Self> {
         let value = |index: usize| outputs.get(index).map(|ln| ln.exp());
         Some(Self {
-            lambda_n_per_m: outputs.get(..shapes)?.iter().map(|ln| ln.exp()).collect(),
+            merits: outputs.get(..shapes)?.iter().map(|ln| ln.exp()).collect(),
             inductance_h: value(shapes)?,
             array_inductance_h: value(shapes + 1)?,
             core_field_t: value(shapes + 2),
@@ -78,7 +78,7 @@ impl Physical {
     }
 }
 
-/// What is made as large as possible, of the shapes' force constants relative to the given design's.
+/// What is made as large as possible, of the shapes' merits relative to the given design's.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Objective {
     /// The smallest.
@@ -166,43 +166,62 @@ const LEAST_CORE_MM: f64 = 1.0;
 /// Distance of the magnet's centre from the core's top, mm, beside which a millimetre counts.
 const ROOM_MM: f64 = 10.0;
 
+/// The room between the array and the shapes where they are given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Room {
+    /// Height that no core may reach, m.
+    pub ceiling_m: f64,
+    /// How far the shapes may be moved down (<= 0) and up, m.
+    pub height_m: [f64; 2],
+}
+
 /// The array as a problem of `numerics::mixed_search`.
 pub struct ArrayProblem<'a> {
     /// The designs.
     pub space: Space,
     physics: &'a dyn Physics,
     objective: Objective,
-    /// Logarithms of the force constants that count as 1.
+    /// Logarithms of the merits that count as 1.
     reference_ln: Vec<f64>,
-    /// Height, m, below which nothing of the array may reach where the shapes are not raised.
-    ceiling_m: f64,
-    /// Limits of the coil that all designs of the space meet or break alike: no part of the search.
-    unchanged: Vec<&'static str>,
+    room: Room,
+    /// Limits that are no part of the search, by key: those of the coil that all designs of the space meet or
+    /// break alike.
+    left_out: Vec<&'static str>,
     /// What full accuracy adds to the outputs of the search.
     correction: RwLock<Vec<f64>>,
 }
 
 impl<'a> ArrayProblem<'a> {
-    /// A problem of `space`; `reference_n_per_m` are force constants that count as 1.
+    /// A problem of `space`; `reference` are merits that count as 1.
     #[must_use]
     pub fn new(
         space: Space,
         physics: &'a dyn Physics,
         objective: Objective,
-        reference_n_per_m: &[f64],
-        ceiling_m: f64,
+        reference: &[f64],
+        room: Room,
     ) -> Self {
         let mut problem = Self {
             space,
             physics,
             objective,
-            reference_ln: reference_n_per_m.iter().map(|l| l.ln()).collect(),
-            ceiling_m,
-            unchanged: Vec::new(),
+            reference_ln: reference.iter().map(|merit| merit.ln()).collect(),
+            room,
+            left_out: Vec::new(),
             correction: RwLock::default(),
         };
-        problem.unchanged = problem.unchanged_limits();
+        problem.left_out = problem.unchanged_limits();
         problem
+    }
+
+    /// Takes the limits of this key out of the search.
+    pub(super) fn leave_out(&mut self, key: &'static str) {
+        self.left_out.push(key);
+    }
+
+    /// Takes them in again.
+    pub(super) fn take_in(&mut self, key: &'static str) {
+        self.left_out.retain(|known| *known != key);
     }
 
     fn unchanged_limits(&self) -> Vec<&'static str> {
@@ -269,15 +288,15 @@ impl<'a> ArrayProblem<'a> {
         Physical::of_outputs(&self.corrected(outputs), self.reference_ln.len())
     }
 
-    /// The objective's parts: logarithms of the force constants over those of the reference.
+    /// The objective's parts: logarithms of the merits over those of the reference.
     #[must_use]
     pub fn objectives(&self, physical: Option<&Physical>) -> Vec<f64> {
         let Some(physical) = physical else {
             return vec![0.0];
         };
-        let ratios = physical.lambda_n_per_m.iter().zip(&self.reference_ln);
+        let ratios = physical.merits.iter().zip(&self.reference_ln);
         let ratios: Vec<f64> = ratios
-            .map(|(lambda, reference)| lambda.ln() - reference)
+            .map(|(merit, reference)| merit.ln() - reference)
             .collect();
         match &self.objective {
             Objective::Smallest => ratios,
@@ -306,10 +325,11 @@ impl<'a> ArrayProblem<'a> {
     pub fn bounds(&self, x: &[f64], physical: Option<&Physical>) -> Vec<Bounded> {
         let design = self.space.design(x);
         let mut all = Self::of_table(&design, physical);
-        all.retain(|bound| !self.unchanged.contains(&bound.key));
         self.add_winding(&design, &mut all);
         self.add_core(x, &design, &mut all);
         add_plate(&design, &mut all);
+        self.add_height(x, &mut all);
+        all.retain(|bound| !self.left_out.contains(&bound.key));
         all
     }
 
@@ -387,7 +407,7 @@ impl<'a> ArrayProblem<'a> {
         let (least_m, room_m) = (LEAST_CORE_MM * 1e-3, ROOM_MM * 1e-3);
         let diameter_m = coil.inner_diameter_m - 2.0 * core.clearance_m;
         let length_m = coil.length_m + core.above_m + core.below_m;
-        let ceiling_m = self.ceiling_m + self.space.raised_m(x).min(0.0) - 0.05 * diameter_m;
+        let ceiling_m = self.room.ceiling_m + self.space.raised_m(x).min(0.0) - 0.05 * diameter_m;
         let bounds = [
             Bounded::at_least("core_diameter_m", diameter_m, least_m),
             Bounded::at_least("core_length_m", length_m, least_m),
@@ -395,6 +415,22 @@ impl<'a> ArrayProblem<'a> {
         ];
         all.extend(bounds.map(|bound| Bounded {
             scale: Some(room_m),
+            ..bound
+        }));
+    }
+
+    /// What leaves raised shapes in the workspace, where a runtime gives forces.
+    fn add_height(&self, x: &[f64], all: &mut Vec<Bounded>) {
+        let Some(height_mm) = self.space.value(x, Axis::Height) else {
+            return;
+        };
+        let [low, high] = self.room.height_m.map(|end| end * 1e3);
+        let bounds = [
+            Bounded::at_least("shapes.height_mm", height_mm, low),
+            Bounded::at_most("shapes.height_mm", height_mm, high),
+        ];
+        all.extend(bounds.map(|bound| Bounded {
+            scale: Some(ROOM_MM),
             ..bound
         }));
     }

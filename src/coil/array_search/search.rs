@@ -8,7 +8,7 @@ use fluxform_base::progress::{Interrupted, interruptible, to_its_end};
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Search, Settings};
 
-use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics};
+use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room};
 use super::space::{Choice, Space, choices};
 
 /// What is searched, and how.
@@ -18,8 +18,10 @@ pub struct Request {
     pub objective: Objective,
     /// Evaluations, starts and seed.
     pub settings: Settings,
-    /// Height, m, that no core may reach.
-    pub ceiling_m: f64,
+    /// Where cores and shapes may reach.
+    pub room: Room,
+    /// Whether the best choice of every number of coils is searched to its end, not the best of all alone.
+    pub every_count: bool,
 }
 
 /// Why there is no search.
@@ -30,7 +32,7 @@ pub enum Refused {
     Space(String),
     /// No design within the ranges meets the limits that need no forces.
     #[error(
-        "no design within [search] meets {limits}; the nearest, {nearest}, breaks {broken}: widen the ranges or relax a limit"
+        "no design within [search] meets {limits}; the nearest, {nearest}, has {broken}: widen the ranges or relax a limit"
     )]
     Contradiction {
         /// The limits that contradict each other or the ranges.
@@ -89,6 +91,9 @@ pub struct SearchedChoice {
     pub objective: Option<f64>,
     /// The array, by key.
     pub values: BTreeMap<String, f64>,
+    /// Whether every array of it was computed.
+    #[serde(skip)]
+    pub complete: bool,
 }
 
 impl SearchedChoice {
@@ -111,6 +116,7 @@ impl SearchedChoice {
             evaluations: search.samples().len(),
             objective: met.map(|(_, judged)| judged.objective().exp()),
             values,
+            complete: search.is_complete(),
         }
     }
 }
@@ -145,19 +151,22 @@ const LEAST_EVALUATIONS: usize = 16;
 pub fn problems<'a>(
     design: &Design,
     request: &Request,
-    reference_n_per_m: &[f64],
+    reference: &[f64],
     physics: &'a dyn Physics,
 ) -> Result<Vec<ArrayProblem<'a>>, Refused> {
     let mut faults = Vec::new();
     let mut problems = Vec::new();
     for choice in choices(design, &design.search) {
-        match problem(design, request, &choice, reference_n_per_m, physics) {
+        match problem(design, request, &choice, reference, physics) {
             Ok(problem) => problems.push(problem),
             Err(refused) => faults.push(refused),
         }
     }
     match faults.into_iter().next() {
         Some(refused) if problems.is_empty() => Err(refused),
+        _ if problems.len() == 1 && problems[0].space.axes().is_empty() => Err(Refused::Space(
+            "nothing is searched: add [search] with a range for a key, like array.pitch_mm = [40, 60]".to_owned(),
+        )),
         _ => Ok(problems),
     }
 }
@@ -166,7 +175,7 @@ fn problem<'a>(
     design: &Design,
     request: &Request,
     choice: &Choice,
-    reference_n_per_m: &[f64],
+    reference: &[f64],
     physics: &'a dyn Physics,
 ) -> Result<ArrayProblem<'a>, Refused> {
     let space = Space::new(design, &design.search, choice).map_err(Refused::Space)?;
@@ -174,38 +183,72 @@ fn problem<'a>(
         space,
         physics,
         request.objective.clone(),
-        reference_n_per_m,
-        request.ceiling_m,
+        reference,
+        request.room,
     );
     let search = Search::new(&problem, request.settings);
     let (x, judged) = search.least_broken(&problem.space.given(design));
     if judged.excess() <= MET {
         return Ok(problem);
     }
-    let bounds = problem.bounds(&x, None);
-    let broken: Vec<&Bounded> = bounds.iter().filter(|b| problem.breaks(b)).collect();
-    let named: Vec<String> = broken
-        .iter()
-        .map(|b| described(b.key, b.limit, b.at_least))
-        .collect();
     let nearest = problem.space.axes().iter().zip(&x);
     let nearest: Vec<String> = nearest
-        .map(|(axis, x)| format!("{} = {x:.4}", axis.key()))
+        .map(|(axis, x)| format!("{} = {}", axis.key(), short(*x)))
         .collect();
+    let bounds = problem.bounds(&x, None);
+    let broken = bounds.iter().filter(|bound| problem.breaks(bound));
     let broken: Vec<String> = broken
+        .map(|bound| format!("{} {}", label(bound), in_unit(bound, bound.value)))
+        .collect();
+    let given = problem.space.given(design);
+    let limits: Vec<String> = contradicting(problem, &given, request.settings)
         .iter()
-        .map(|b| format!("{} = {:.5}", b.key, b.value))
+        .map(|bound| {
+            let sign = if bound.at_least { ">=" } else { "<=" };
+            format!("{} {sign} {}", label(bound), in_unit(bound, bound.limit))
+        })
         .collect();
     Err(Refused::Contradiction {
-        limits: named.join(" and "),
+        limits: limits.join(" and "),
         nearest: nearest.join(", "),
         broken: broken.join(", "),
     })
 }
 
-fn described(key: &str, limit: f64, at_least: bool) -> String {
-    let sign = if at_least { ">=" } else { "<=" };
-    format!("{key} {sign} {limit:.6}")
+/// Limits that cannot be met together, whereas they can without any one of them.
+fn contradicting(mut problem: ArrayProblem<'_>, given: &[f64], settings: Settings) -> Vec<Bounded> {
+    let bounds = problem.bounds(given, None);
+    for bound in &bounds {
+        problem.leave_out(bound.key);
+        let (_, judged) = Search::new(&problem, settings).least_broken(given);
+        if judged.excess() <= MET {
+            problem.take_in(bound.key);
+        }
+    }
+    problem.bounds(given, None)
+}
+
+/// What the user wrote, or would write, for a limit.
+fn label(bound: &Bounded) -> &'static str {
+    bound.name.map_or(bound.key, |name| name.limit().label)
+}
+
+/// In the unit of a limit's design key.
+fn in_unit(bound: &Bounded, value: f64) -> String {
+    let (unit, per_unit) = match bound.name {
+        Some(name) => name.limit().written,
+        None if bound.key.ends_with("_m") => ("mm", 1e3),
+        None => ("mm", 1.0),
+    };
+    format!("{} {unit}", short(value * per_unit))
+}
+
+/// Four digits.
+fn short(value: f64) -> String {
+    let rounded = format!("{value:.3e}");
+    rounded
+        .parse::<f64>()
+        .map_or(rounded, |value| value.to_string())
 }
 
 /// Searches every problem and computes the best design to full accuracy.
@@ -215,15 +258,17 @@ fn described(key: &str, limit: f64, at_least: bool) -> String {
 pub fn run<'a>(
     problems: &'a [ArrayProblem<'a>],
     design: &Design,
-    settings: Settings,
+    request: &Request,
 ) -> Result<Option<Found<'a>>, Interrupted> {
+    let settings = request.settings;
     let mut going: Vec<(usize, Search<'a>)> = problems
         .iter()
         .enumerate()
         .map(|(index, problem)| (index, Search::new(problem, settings)))
         .collect();
     let mut evaluations = 0;
-    let mut choices = Vec::new();
+    // The worst first.
+    let mut left_out: Vec<(usize, Search<'a>)> = Vec::new();
     let mut interrupted = false;
     // The better half goes on with twice as many evaluations each.
     while going.len() > 1 && !interrupted {
@@ -243,10 +288,8 @@ pub fn run<'a>(
                 .map_or(f64::NEG_INFINITY, |(_, judged)| judged.merit())
         };
         going.sort_by(|a, b| merit(&b.1).total_cmp(&merit(&a.1)).then(a.0.cmp(&b.0)));
-        let left_out = going.split_off(going.len().div_ceil(2));
-        let searched = left_out.iter().rev();
-        choices
-            .extend(searched.map(|(index, search)| SearchedChoice::of(&problems[*index], search)));
+        let worse = going.split_off(going.len().div_ceil(2));
+        left_out.extend(worse.into_iter().rev());
     }
     let Some((index, mut search)) = going.into_iter().next() else {
         return Ok(None);
@@ -261,16 +304,37 @@ pub fn run<'a>(
     };
     interrupted |= accepted.is_err();
     evaluations += search.samples().len() - before;
-    let (best, choice) = to_its_end(|| {
+    if request.every_count && !interrupted {
+        let coils = |index: usize| problems[index].space.coils();
+        let mut done = vec![coils(index)];
+        for (other, search) in left_out.iter_mut().rev() {
+            if done.contains(&coils(*other)) {
+                continue;
+            }
+            done.push(coils(*other));
+            let before = search.samples().len();
+            search.allow(settings.evaluations);
+            interrupted |= is_stopped(|| search.run(&[problems[*other].space.given(design)]));
+            evaluations += search.samples().len() - before;
+        }
+    }
+    let (best, choices) = to_its_end(|| {
         let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));
         let best = best.map(|best| Candidate {
             x: problem.space.made(&best.x),
             ..best
         });
-        (best, SearchedChoice::of(problem, &search))
+        let all = std::iter::once((index, &search)).chain(
+            left_out
+                .iter()
+                .rev()
+                .map(|(index, search)| (*index, search)),
+        );
+        let choices: Vec<_> = all
+            .map(|(index, search)| SearchedChoice::of(&problems[index], search))
+            .collect();
+        (best, choices)
     });
-    choices.push(choice);
-    choices.reverse();
     Ok(best.map(|best| Found {
         problem,
         search,

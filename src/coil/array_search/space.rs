@@ -369,9 +369,6 @@ impl Space {
                 self.push(Axis::Move(group), values);
             }
         }
-        if self.axes.is_empty() {
-            return Err("nothing is searched: add [search] with a range for a key, like array.pitch_mm = [40, 60]".to_owned());
-        }
         Ok(())
     }
 

@@ -110,6 +110,8 @@ pub struct TradedDesign {
     pub met: bool,
     /// Whether it does but for that of each quantity.
     met_but: [bool; 3],
+    /// Whether it was computed as the best for some value of each quantity.
+    best_for: [bool; 3],
     values: BTreeMap<String, f64>,
 }
 
@@ -119,12 +121,14 @@ const LOSS: f64 = 0.01;
 const FLATTEST: f64 = 0.02;
 /// Multipliers below this are rounding.
 const ACTIVE: f64 = 1e-4;
-/// Parts of the best design's mass, heat and time for which the best is computed.
-const PARTS: [f64; 6] = [0.5, 0.65, 0.8, 0.92, 1.15, 1.4];
+/// Parts of the best design's mass, heat and time for which the best is computed, from the nearest on.
+const PARTS: [&[f64]; 2] = [&[0.92, 0.8, 0.65, 0.5, 0.35, 0.25], &[1.15, 1.4]];
+/// Descents for each, every one on a surrogate that knows where the one before ended.
+const DESCENTS: usize = 2;
 /// Steps to which neighbours' lengths are rounded, mm.
 const STEPS_MM: [f64; 2] = [0.5, 1.0];
 /// Evaluations that the study may add.
-const ROOM: usize = 80;
+pub const MORE_EVALUATIONS: usize = 80;
 
 /// The quantities that are traded for the objective, by key.
 pub const TRADED: [(&str, LimitName); 3] = [
@@ -151,6 +155,8 @@ fn traded(problem: &ArrayProblem, x: &[f64], physical: &Physical, name: LimitNam
 struct View<'a, 'b> {
     found: &'b mut Found<'a>,
     surrogate: Surrogate,
+    /// Designs that were computed as the best for some value of each traded quantity.
+    best_for: [Vec<Vec<f64>>; 3],
 }
 
 /// The surroundings of `found`, compared with `design`.
@@ -158,12 +164,17 @@ struct View<'a, 'b> {
 /// # Errors
 /// Interruption.
 pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
-    let allowed = found.search.samples().len() + ROOM;
+    let allowed = found.search.samples().len() + MORE_EVALUATIONS;
     found.search.allow(allowed);
     let Some(surrogate) = found.search.surrogate() else {
         return Ok(Study::default());
     };
-    let mut view = View { found, surrogate };
+    let best_for = std::array::from_fn(|_| vec![found.best.x.clone()]);
+    let mut view = View {
+        found,
+        surrogate,
+        best_for,
+    };
     let limits = view.limits();
     let before = view.found.search.samples().len();
     let variables = view.variables(design)?;
@@ -366,41 +377,58 @@ impl View<'_, '_> {
         Ok(all)
     }
 
-    /// Computes the best designs of less and more mass, heat and time.
+    /// Computes the best designs of less and more mass, heat and time, one from the next.
     fn trade(&mut self) -> Result<(), Interrupted> {
-        for (_, name) in TRADED {
+        for (cost, (_, name)) in TRADED.into_iter().enumerate() {
             let best = &self.found.best;
             let Some(here) = traded(self.problem(), &best.x, &best.physical, name) else {
                 continue;
             };
-            for part in PARTS {
-                let judge = |x: &[f64], outputs: &[f64]| {
-                    let physical = self.problem().estimate(outputs);
-                    let mut bounds = self.problem().bounds(x, physical.as_ref());
-                    bounds.retain(|bound| bound.name != Some(name));
-                    let mut judged = self.problem().judged(physical.as_ref(), &bounds);
-                    let value = physical.and_then(|p| traded(self.problem(), x, &p, name));
-                    judged
-                        .limits
-                        .push((value.unwrap_or(f64::NAN) / (part * here)).ln());
-                    judged
-                };
-                let ended =
-                    self.found
-                        .search
-                        .climb_otherwise(&self.surrogate, &judge, &best.x, &[]);
-                if let Some((x, _)) = ended.filter(|(_, ended)| ended.judged.excess() <= OFF) {
-                    self.found.search.evaluate(vec![x])?;
+            for parts in PARTS {
+                let mut x = self.found.best.x.clone();
+                for most in parts.iter().map(|part| part * here) {
+                    for _ in 0..DESCENTS {
+                        let Some(next) = self.best_below(&x, name, most) else {
+                            break;
+                        };
+                        if next == x {
+                            break;
+                        }
+                        self.found.search.evaluate(vec![next.clone()])?;
+                        let made = self.problem().space.made(&next);
+                        self.best_for[cost].push(made);
+                        if let Some(surrogate) = self.found.search.surrogate() {
+                            self.surrogate = surrogate;
+                        }
+                        x = next;
+                    }
                 }
             }
         }
         Ok(())
     }
 
+    /// By the surrogate the best design of which a quantity is `most` at most instead of its own limit.
+    fn best_below(&self, from: &[f64], name: LimitName, most: f64) -> Option<Vec<f64>> {
+        let judge = |x: &[f64], outputs: &[f64]| {
+            let physical = self.problem().estimate(outputs);
+            let mut bounds = self.problem().bounds(x, physical.as_ref());
+            bounds.retain(|bound| bound.name != Some(name));
+            let mut judged = self.problem().judged(physical.as_ref(), &bounds);
+            let value = physical.and_then(|p| traded(self.problem(), x, &p, name));
+            judged.limits.push((value.unwrap_or(f64::NAN) / most).ln());
+            judged
+        };
+        let search = &self.found.search;
+        let ended = search.climb_otherwise(&self.surrogate, &judge, from, &[])?;
+        (ended.1.judged.excess() <= OFF).then_some(ended.0)
+    }
+
     /// Every design that was computed.
     fn designs(&self) -> Vec<TradedDesign> {
         let problem = self.problem();
         let design = |sample: &Sample| {
+            let made = problem.space.made(&sample.x);
             let physical = problem.estimate(sample.outputs.as_ref()?)?;
             let bounds = problem.bounds(&sample.x, Some(&physical));
             let met_but = TRADED.map(|(_, name)| {
@@ -417,6 +445,7 @@ impl View<'_, '_> {
                 costs: [mass, power, settling],
                 met: bounds.iter().all(Bounded::is_met),
                 met_but,
+                best_for: std::array::from_fn(|cost| self.best_for[cost].contains(&made)),
                 values: self.named(&sample.x),
             })
         };
@@ -429,7 +458,8 @@ impl View<'_, '_> {
     }
 }
 
-/// Of the designs that meet all limits but that of one cost those that nothing beats.
+/// Of the designs that meet all limits but that of one cost those that nothing beats, as far as they were
+/// computed for it: others that nothing happens to beat are not the best for what they cost.
 fn on_front(designs: &[TradedDesign], cost: usize) -> Vec<usize> {
     let met: Vec<usize> = (0..designs.len())
         .filter(|index| designs[*index].met_but[cost])
@@ -438,7 +468,10 @@ fn on_front(designs: &[TradedDesign], cost: usize) -> Vec<usize> {
         .iter()
         .map(|index| [designs[*index].costs[cost], designs[*index].objective])
         .collect();
-    front(&points).into_iter().map(|index| met[index]).collect()
+    let unbeaten = front(&points).into_iter().map(|index| met[index]);
+    unbeaten
+        .filter(|index| designs[*index].best_for[cost])
+        .collect()
 }
 
 /// Excess that is the surrogate's error.

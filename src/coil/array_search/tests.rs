@@ -6,7 +6,7 @@ use fluxform_base::progress::Interrupted;
 use fluxform_design::{Design, Need};
 use fluxform_numerics::mixed_search::Settings;
 
-use super::problem::{Level, Objective, Physical, Physics};
+use super::problem::{Level, Objective, Physical, Physics, Room};
 use super::search::{Request, problems, run};
 use super::study::study;
 use crate::circuit;
@@ -32,7 +32,7 @@ impl Physics for OnAxis {
         };
         let inductance_h = self_inductance_h(&winding);
         Ok(Some(Physical {
-            lambda_n_per_m: vec![field.dbz_dz.abs() / height_m],
+            merits: vec![field.dbz_dz.abs() / height_m],
             inductance_h,
             array_inductance_h: inductance_h,
             core_field_t: None,
@@ -58,7 +58,11 @@ fn request() -> Request {
             evaluations: 200,
             ..Settings::default()
         },
-        ceiling_m: 0.03,
+        room: Room {
+            ceiling_m: 0.03,
+            height_m: [-0.02, 0.05],
+        },
+        every_count: false,
     }
 }
 
@@ -73,7 +77,7 @@ fn one_coil_alone_is_the_best_coil_of_eq_11() {
     use fluxform_field::magnet::MagnetRule;
     let design = design(ONE_COIL);
     let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
-    let found = run(&all, &design, request().settings)
+    let found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
     assert!(found.best.is_feasible(), "{:?}", found.best.bounds);
@@ -116,7 +120,7 @@ fn one_coil_alone_is_the_best_coil_of_eq_11() {
 fn the_study_holds_against_what_it_says() {
     let design = design(ONE_COIL);
     let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
-    let mut found = run(&all, &design, request().settings)
+    let mut found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
     let study = study(&mut found, &design).expect("not interrupted");
@@ -171,7 +175,7 @@ fn regression_a_core_turned_inside_out_took_all_memory() {
                   core.above_mm = [-200.0, 5.0]\ncore.below_mm = [-200.0, 5.0]\ncore.clearance_mm = [0.0, 9.0]\n";
     let design = design(search);
     let all = problems(&design, &request(), &[1.0], &NoCoreInsideOut).expect("a search");
-    let found = run(&all, &design, request().settings)
+    let found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
     assert!(found.best.is_feasible(), "{:?}", found.best.bounds);

@@ -8,7 +8,7 @@ use crate::bundle::sweep::{
 };
 use crate::coil::optimum::Ending;
 use crate::commands::evaluate::evaluate;
-use crate::commands::optimize::array::physics::{ArrayPhysics, Constant};
+use crate::commands::optimize::array::physics::{Aim, ArrayPhysics};
 use crate::commands::optimize::array::{
     ArrayEnding, ArrayRequest, optimize_array, settling_in_array,
 };
@@ -20,7 +20,6 @@ use crate::progress::{Interrupted, Silent, poll};
 use crate::scene::Scene;
 use crate::scene::rated::{CircuitSummary, Rated};
 use crate::scene::sources::ShapeSource;
-use crate::units::FORCE_JND;
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
@@ -109,8 +108,7 @@ impl Sweep<'_> {
     fn array(&self, design: Design, text: String, index: u64) -> Result<Computed, RunError> {
         let tolerance = self.plan.tolerance;
         let (design, text) = settling_in_array(design, text, self.path, tolerance)?;
-        let constant = Constant::default();
-        let physics = ArrayPhysics::new(&self.shapes, (constant, FORCE_JND), tolerance, &Silent)?;
+        let physics = ArrayPhysics::new(&self.shapes, Aim::default(), tolerance, &Silent)?;
         let default = Settings::default();
         let settings = Settings {
             seed: self.plan.seed_at(index),
@@ -122,11 +120,10 @@ impl Sweep<'_> {
             ..default
         };
         let request = ArrayRequest {
-            constant,
-            jnd_weight: FORCE_JND,
             shares: Some(vec![1.0; self.shapes.len()]),
             settings,
             tolerance,
+            every_count: false,
         };
         let document = Document {
             design: &design,
@@ -162,7 +159,7 @@ impl Sweep<'_> {
             lambda_n_per_m: found
                 .shapes
                 .iter()
-                .map(|shape| shape.lambda_n_per_m)
+                .filter_map(|shape| shape.lambda_n_per_m)
                 .collect(),
             coils: best.array.positions_m.len() as u64,
             evaluations: found.evaluations as u64,

@@ -62,12 +62,16 @@ pub struct Sample {
 
 /// Evaluated together.
 const BATCH: usize = 4;
-/// First designs, per variable and in all.
-const FIRST_PER_VARIABLE: usize = 2;
-const FIRST: usize = 6;
+/// Designs about the given one before the first descent, besides one per variable.
+const NEAR_GIVEN: usize = 2;
+/// Designs over all ranges before the second, per variable and in all.
+const SPREAD_PER_VARIABLE: usize = 2;
+const SPREAD: usize = 6;
 /// Width of the first trust region, of that of a descent in the same valley, and of the widest.
 const FIRST_WIDTH: f64 = 0.3;
 const WIDEST: f64 = 0.6;
+/// Width at which the first descent ends: designs spread over all ranges come before its last digits.
+const COARSE: f64 = 0.05;
 /// Width of the region in which a design is refined.
 const REFINED_WIDTH: f64 = 0.02;
 /// Places from which a design within the limits is looked for.
@@ -95,6 +99,10 @@ pub struct Search<'a> {
     random: Random,
     /// Descents that came to their end, and where.
     ends: Vec<Vec<f64>>,
+    /// Whether designs were spread over all ranges.
+    spread: bool,
+    /// Whether every design was evaluated.
+    complete: bool,
 }
 
 impl<'a> Search<'a> {
@@ -107,6 +115,8 @@ impl<'a> Search<'a> {
             samples: Vec::new(),
             random: Random::new(settings.seed),
             ends: Vec::new(),
+            spread: false,
+            complete: false,
         }
     }
 
@@ -120,6 +130,12 @@ impl<'a> Search<'a> {
     #[must_use]
     pub fn ends(&self) -> &[Vec<f64>] {
         &self.ends
+    }
+
+    /// Whether the variables are whole or listed and every design was evaluated.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.complete
     }
 
     /// Objective and limits of a design that was evaluated.
@@ -141,21 +157,37 @@ impl<'a> Search<'a> {
             .reduce(|a, b| if better(&b.1, &a.1) { b } else { a })
     }
 
-    /// Evaluates the `given` designs, then searches from them until every descent has ended or the
-    /// evaluations are used up. What was learned stays where it is interrupted.
+    /// Evaluates the `given` designs and descends from the best design near the first of them; then
+    /// from designs spread over all ranges, until every descent has ended or the evaluations are used
+    /// up. What was learned stays where it is interrupted.
     ///
     /// # Errors
     /// Interruption.
     pub fn run(&mut self, given: &[Vec<f64>]) -> Result<(), Interrupted> {
+        if let Some(all) = self.all_designs() {
+            self.evaluate(all)?;
+            self.complete = true;
+            return Ok(());
+        }
         let size = self.problem.variables().len();
-        self.evaluate(given.to_vec())?;
-        let first = FIRST + FIRST_PER_VARIABLE * size;
-        while self.samples.len() < first.min(self.settings.evaluations) {
-            let batch = self.scattered(&vec![0.5; size], 1.0, BATCH);
-            if batch.is_empty() {
-                break;
+        let mut first = given.to_vec();
+        if let Some(given) = given.first() {
+            // Limits that cost nothing are met before the first descent.
+            first.push(self.least_broken(given).0);
+        }
+        self.evaluate(first)?;
+        if let Some(near) = self.samples.last().map(|sample| self.units(&sample.x)) {
+            self.scatter(&near, FIRST_WIDTH, size + NEAR_GIVEN)?;
+        }
+        let everywhere = vec![0.5; size];
+        let spread = SPREAD + SPREAD_PER_VARIABLE * size;
+        if !self.spread {
+            // What lies near the given design is known soon; whether it is the best is seen from afar.
+            if let Some(center) = self.start(0).filter(|_| !self.spent()) {
+                self.descend(center, FIRST_WIDTH, COARSE)?;
             }
-            self.evaluate(batch)?;
+            self.spread = true;
+            self.scatter(&everywhere, 1.0, self.samples.len() + spread)?;
         }
         for start in self.ends.len()..self.settings.starts {
             if self.spent() {
@@ -164,11 +196,37 @@ impl<'a> Search<'a> {
             let Some(center) = self.start(start) else {
                 break;
             };
-            let end = self.descend(center, FIRST_WIDTH)?;
+            let end = self.descend(center, FIRST_WIDTH, self.settings.finest)?;
             if self.spent() {
                 break;
             }
             self.ends.push(end);
+        }
+        Ok(())
+    }
+
+    /// Every design, where those are not more than may be evaluated.
+    fn all_designs(&self) -> Option<Vec<Vec<f64>>> {
+        let mut all = vec![Vec::new()];
+        for variable in self.problem.variables() {
+            let values = variable.all(self.settings.evaluations / all.len())?;
+            all = all
+                .iter()
+                .flat_map(|x: &Vec<f64>| values.iter().map(|value| [&x[..], &[*value]].concat()))
+                .collect();
+        }
+        Some(all)
+    }
+
+    /// Evaluates scattered designs of a region until there are `count` in all.
+    fn scatter(&mut self, center: &[f64], width: f64, count: usize) -> Result<(), Interrupted> {
+        while self.samples.len() < count.min(self.settings.evaluations) {
+            let left = count - self.samples.len();
+            let batch = self.scattered(center, width, left.min(BATCH));
+            if batch.is_empty() {
+                break;
+            }
+            self.evaluate(batch)?;
         }
         Ok(())
     }
@@ -184,11 +242,14 @@ impl<'a> Search<'a> {
     /// # Errors
     /// Interruption.
     pub fn refine(&mut self) -> Result<(), Interrupted> {
+        if self.complete {
+            return Ok(());
+        }
         let merits = self.samples.iter().enumerate();
         let merits = merits.filter_map(|(index, s)| Some((self.judged(s)?, index)));
         let best = merits.reduce(|a, b| if better(&b.0, &a.0) { b } else { a });
         if let Some((_, center)) = best {
-            self.descend(center, REFINED_WIDTH)?;
+            self.descend(center, REFINED_WIDTH, self.settings.finest)?;
         }
         Ok(())
     }
@@ -253,10 +314,10 @@ impl<'a> Search<'a> {
             .map(|(_, index)| index)
     }
 
-    /// Follows the surrogate from sample `center` until the trust region is as narrow as requested.
-    fn descend(&mut self, center: usize, width: f64) -> Result<Vec<f64>, Interrupted> {
+    /// Follows the surrogate from sample `center` until the trust region is not wider than `finest`.
+    fn descend(&mut self, center: usize, width: f64, finest: f64) -> Result<Vec<f64>, Interrupted> {
         let (mut center, mut width) = (center, width);
-        while width > self.settings.finest && !self.spent() {
+        while width > finest && !self.spent() {
             let at = self.units(&self.samples[center].x);
             let Some(surrogate) = self.surrogate() else {
                 // Too few designs have outputs: those near one that has are tried first.

@@ -35,6 +35,20 @@ impl Variable {
         (x - self.low) / (self.high - self.low)
     }
 
+    /// Its values, where there are at most so many.
+    pub(super) fn all(&self, most: usize) -> Option<Vec<f64>> {
+        let all = match &self.values {
+            Values::Continuous => return None,
+            Values::Whole if self.high - self.low < most as f64 => {
+                let count = (self.high - self.low) as usize;
+                (0..=count).map(|k| self.low + k as f64).collect()
+            }
+            Values::Whole => return None,
+            Values::Listed(list) => list.clone(),
+        };
+        (all.len() <= most).then_some(all)
+    }
+
     /// The nearest allowed values at and below, at and above `x`.
     pub(super) fn neighbours(&self, x: f64) -> [f64; 2] {
         match &self.values {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::physics::{ArrayPhysics, Constant, Journal};
+use super::physics::{Aim, ArrayPhysics, Constant, Journal};
 use super::{ArrayEnding, ArrayRequest, optimize_array, page, settling_in_array, tables, text};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
@@ -15,6 +15,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::problem::Level;
+use crate::coil::array_search::study::MORE_EVALUATIONS;
 use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
 use crate::design::template::Template;
@@ -37,6 +38,10 @@ pub struct ArrayFlags {
     #[arg(long, hide_short_help = true, value_name = "NAME", requires = "shapes", default_value = "jnd",
           value_parser = values::named::<Constant>())]
     pub constant: Constant,
+    /// The force constant at which `--constant error` makes the error small, N/m
+    #[arg(long = "lambda", hide_short_help = true, value_name = "N/M", requires = "shapes",
+          value_parser = values::force_constant)]
+    pub at_n_per_m: Option<f64>,
     /// Weights of the shapes in the geometric mean of their force constants, in order [default:
     /// equal]
     #[arg(long, hide_short_help = true, value_name = "W,...", requires = "shapes", value_delimiter = ',',
@@ -48,7 +53,8 @@ pub struct ArrayFlags {
     /// Most arrays that the search computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
     pub evaluations: usize,
-    /// Write the trade-offs against mass, heat and settling here (CSV)
+    /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); the best of every
+    /// number of coils is then searched to its end
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
     /// Draw them here, with what limits are worth (SVG, PNG or PDF); of one coil the force around it
@@ -145,12 +151,7 @@ impl ArrayFlags {
             of_table.check(path).map_err(RunError::from)?;
         }
         let bar = begin(printer);
-        let physics = ArrayPhysics::new(
-            &shapes,
-            (self.constant, crate::units::FORCE_JND),
-            shared.tolerance,
-            &bar,
-        )?;
+        let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
         self.read_journal(&physics)?;
         let request = self.request(shared, shapes.len())?;
         printer.notice(&estimate(&design, &physics, &request));
@@ -232,6 +233,21 @@ impl ArrayFlags {
         template.with(settings).map_err(Failure::Usage)
     }
 
+    fn aim(&self) -> Result<Aim, Failure> {
+        if (self.constant == Constant::Error) != self.at_n_per_m.is_some() {
+            return Err(Failure::Usage(
+                "--constant error and --lambda go together: the error depends on the force constant, \
+                 the other constants on none"
+                    .to_owned(),
+            ));
+        }
+        Ok(Aim {
+            constant: self.constant,
+            at_n_per_m: self.at_n_per_m,
+            ..Aim::default()
+        })
+    }
+
     fn request(&self, shared: &Shared<'_>, shapes: usize) -> Result<ArrayRequest, Failure> {
         let sound = |share: &f64| *share > 0.0 && share.is_finite();
         if !self.shares.is_empty()
@@ -245,8 +261,6 @@ impl ArrayFlags {
         let equal = || vec![1.0; shapes];
         let default = Settings::default();
         Ok(ArrayRequest {
-            constant: self.constant,
-            jnd_weight: crate::units::FORCE_JND,
             shares: (!self.smallest).then(|| {
                 if self.shares.is_empty() {
                     equal()
@@ -261,6 +275,7 @@ impl ArrayFlags {
                 ..default
             },
             tolerance: shared.tolerance,
+            every_count: self.front.is_some(),
         })
     }
 
@@ -328,10 +343,11 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
         + physics.count(Level::Search) as f64
             * design.array.positions_m.len() as f64
             * POINT_COIL_S;
+    let evaluations = request.settings.evaluations;
     format!(
-        "computes {} arrays at most, about {:.0} CPU s; Ctrl-C gives the best so far",
-        request.settings.evaluations,
-        (each * request.settings.evaluations as f64).ceil()
+        "computes {evaluations} arrays at most and {MORE_EVALUATIONS} about the best, about {:.0} CPU s; Ctrl-C gives \
+         the best so far",
+        (each * (evaluations + MORE_EVALUATIONS) as f64).ceil()
     )
 }
 

@@ -3,6 +3,7 @@
 pub(crate) mod command;
 mod page;
 pub(crate) mod physics;
+mod pitch_bound;
 mod result;
 pub(crate) mod tables;
 mod text;
@@ -13,10 +14,12 @@ use std::path::Path;
 pub use result::*;
 
 use self::physics::{ArrayPhysics, Constant};
+use self::pitch_bound::{PitchBound, pitch_bound};
 use super::Document;
 use crate::RunError;
+use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::coil::array_search::problem::{Level, Objective, Physical, Physics};
+use crate::coil::array_search::problem::{Level, Objective, Physical, Physics, Room};
 use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
 use crate::coil::array_search::study::{Study, study};
 use crate::commands::evaluate::evaluate;
@@ -33,22 +36,29 @@ use crate::scene::sources::ShapeSource;
 /// The options of [`optimize_array`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArrayRequest {
-    /// What is made large.
-    pub constant: Constant,
-    /// Just-noticeable difference.
-    pub jnd_weight: f64,
     /// Weights of the shapes in the geometric mean; `None`: the smallest counts.
     pub shares: Option<Vec<f64>>,
     /// Evaluations, starts, seed.
     pub settings: Settings,
     /// Allowed error of the final evaluation.
     pub tolerance: Option<f64>,
+    /// Whether every number of coils is searched to its end.
+    pub every_count: bool,
 }
 
 /// What every shape renders with the given design, at both levels.
 struct Before {
     search: Physical,
     full: Physical,
+}
+
+impl Before {
+    fn at(&self, level: Level) -> &Physical {
+        match level {
+            Level::Search => &self.search,
+            Level::Full => &self.full,
+        }
+    }
 }
 
 /// A design and its text with the limit on a coil's settling as one on the array's too, unless it has its
@@ -103,7 +113,8 @@ pub fn optimize_array(
             None => Objective::Smallest,
         },
         settings: request.settings,
-        ceiling_m: ceiling_m(design, physics),
+        room: room(design, physics),
+        every_count: request.every_count,
     };
     // What contradicts itself is known before anything is computed.
     let refused = |refused: Refused| RunError::Input(refused.to_string());
@@ -116,9 +127,9 @@ pub fn optimize_array(
     progress.begin("given design", 2);
     let before = before(design, shapes, physics, progress)?;
     progress.end();
-    let all = problems(design, &search, &before.search.lambda_n_per_m, physics).map_err(refused)?;
+    let all = problems(design, &search, &before.search.merits, physics).map_err(refused)?;
     progress.begin("arrays", request.settings.evaluations as u64);
-    let found = run(&all, design, request.settings)?;
+    let found = run(&all, design, &search)?;
     let Some(mut found) = found else {
         return Err(RunError::Interrupted(Interrupted));
     };
@@ -129,6 +140,12 @@ pub fn optimize_array(
         true => None,
     };
     progress.end();
+    let bound = match found.interrupted {
+        false => interruptible(|| bound(&found, request, physics, &before, progress))
+            .ok()
+            .flatten(),
+        true => None,
+    };
     // Nothing more is computed after the user's stop.
     found.interrupted |= progress.interrupted();
     let answer = |found: &Found<'_>, around: Option<Study>| {
@@ -138,7 +155,7 @@ pub fn optimize_array(
             (shapes, inputs),
             request,
             physics,
-            (&before, found, around),
+            (&before, found, around, bound),
         )
     };
     if !found.interrupted
@@ -150,14 +167,50 @@ pub fn optimize_array(
     to_its_end(|| answer(&found, around))
 }
 
-/// The height that no core may reach: the workspace's lowest, the target's and the shapes' lowest
-/// point, less what the magnet takes.
-fn ceiling_m(design: &Design, physics: &ArrayPhysics) -> f64 {
-    let lowest = physics
-        .lowest_m()
-        .min(design.workspace.z_m.from)
-        .min(design.target_height_m);
-    lowest - Scene::new(design).map_or(0.0, |scene| scene.magnet_depth_m())
+/// The bound of the gain that `found` was searched for, where there is one.
+fn bound(
+    found: &Found<'_>,
+    request: &ArrayRequest,
+    physics: &ArrayPhysics<'_>,
+    before: &Before,
+    progress: &dyn Progress,
+) -> Option<PitchBound> {
+    let ([_], Level::Full) = (&found.choices[..], found.best.level) else {
+        return None;
+    };
+    let shares = request.shares.as_deref();
+    let known = together(&ratios(&found.best.physical, &before.full), shares);
+    pitch_bound(
+        found.problem,
+        physics,
+        (&before.full.merits, shares),
+        known,
+        progress,
+    )
+    .ok()
+    .flatten()
+}
+
+/// Merits relative to others.
+fn ratios(now: &Physical, before: &Physical) -> Vec<f64> {
+    let pairs = now.merits.iter().zip(&before.merits);
+    pairs.map(|(now, before)| now / before).collect()
+}
+
+/// Where cores and shapes may reach. A core: the workspace's lowest height, the target's and the shapes' lowest
+/// point, less what the magnet takes. Shapes: the heights of the workspace, or farther where they are given there.
+fn room(design: &Design, physics: &ArrayPhysics) -> Room {
+    let [lowest_m, highest_m] = physics.heights_m();
+    let space = design.workspace.z_m;
+    let lowest_used_m = lowest_m.min(space.from).min(design.target_height_m);
+    let depth_m = Scene::new(design).map_or(0.0, |scene| scene.magnet_depth_m());
+    Room {
+        ceiling_m: lowest_used_m - depth_m,
+        height_m: [
+            (space.from - lowest_m).min(0.0),
+            (space.to - highest_m).max(0.0),
+        ],
+    }
 }
 
 fn before(
@@ -191,7 +244,7 @@ fn result(
     (shapes, inputs): (&[ShapeSource], Vec<Input>),
     request: &ArrayRequest,
     physics: &ArrayPhysics,
-    (before, found, around): (&Before, &Found<'_>, Option<Study>),
+    (before, found, around, bound): (&Before, &Found<'_>, Option<Study>, Option<PitchBound>),
 ) -> Result<ArrayOptimization, RunError> {
     let Candidate {
         x,
@@ -199,17 +252,22 @@ fn result(
         bounds,
         level,
     } = &found.best;
-    let given = match level {
-        Level::Search => &before.search,
-        Level::Full => &before.full,
-    };
-    let gains = physical.lambda_n_per_m.iter().zip(&given.lambda_n_per_m);
-    let ratios: Vec<f64> = gains.map(|(now, before)| now / before).collect();
-    let shape = |(index, source): (usize, &ShapeSource)| ShapeGain {
-        shape: source.document.name.clone(),
-        lambda_before_n_per_m: given.lambda_n_per_m[index],
-        lambda_n_per_m: physical.lambda_n_per_m[index],
-        gain: ratios[index],
+    let given = before.at(*level);
+    let ratios = ratios(physical, given);
+    let gain = together(&ratios, request.shares.as_deref());
+    let constant = physics.aim().constant;
+    let of_constant = |merit: f64| (constant != Constant::Error).then_some(merit);
+    let of_error = |merit: f64| (constant == Constant::Error).then(|| merit.recip());
+    let shape = |(index, source): (usize, &ShapeSource)| {
+        let (before, now) = (given.merits[index], physical.merits[index]);
+        ShapeGain {
+            shape: source.document.name.clone(),
+            lambda_before_n_per_m: of_constant(before),
+            lambda_n_per_m: of_constant(now),
+            relative_error_before: of_error(before),
+            relative_error: of_error(now),
+            gain: ratios[index],
+        }
     };
     let axes = found.problem.space.axes().iter().map(|axis| axis.key());
     let search = &found.search;
@@ -251,13 +309,14 @@ fn result(
         design: document.design.name.clone(),
         inputs,
         status,
-        constant: request.constant,
+        constant,
+        at_n_per_m: physics.aim().at_n_per_m,
         objective: if request.shares.is_some() {
             "mean"
         } else {
             "smallest"
         },
-        gain: together(&ratios, request.shares.as_deref()),
+        gain,
         shapes: shapes.iter().enumerate().map(shape).collect(),
         values: axes.zip(x.iter().copied()).collect(),
         limits,
@@ -265,9 +324,18 @@ fn result(
         limits_met,
         study: around,
         certificate: ArrayCertificate {
-            kind: "multistart",
+            kind: match bound {
+                Some(_) => CertificateKind::Global,
+                None if found.choices.iter().all(|choice| choice.complete) => {
+                    CertificateKind::Exhaustive
+                }
+                None => CertificateKind::of_searches(search.ends().len().max(1)),
+            },
             starts: search.ends().len(),
             ends: search.ends().iter().filter_map(objective).collect(),
+            upper_bound: bound.map(|bound| bound.gain),
+            gap: bound.map(|bound| bound.gain / gain - 1.0),
+            cells: bound.map_or(0, |bound| bound.pitches),
         },
         levels: levels(physics, document.design, (before, found))?,
         evaluations: found.evaluations,
@@ -334,13 +402,6 @@ fn levels(
         Level::Search => None,
     };
     if let Some(coarse) = coarse {
-        let ratios = |a: &Physical, b: &Physical| -> Vec<f64> {
-            a.lambda_n_per_m
-                .iter()
-                .zip(&b.lambda_n_per_m)
-                .map(|(a, b)| a / b)
-                .collect()
-        };
         let (given, now) = (
             ratios(&before.search, &before.full),
             ratios(&coarse, &best.physical),

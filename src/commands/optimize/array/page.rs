@@ -63,8 +63,7 @@ pub fn html(result: &ArrayOptimization) -> String {
 fn answer(result: &ArrayOptimization) -> Section {
     let mut body = Html::default();
     let row = |shape: &ShapeGain| -> Vec<Cell> {
-        let [before, now] = [shape.lambda_before_n_per_m, shape.lambda_n_per_m]
-            .map(|lambda| format!("{} N/m", figures(lambda, 4)));
+        let [before, now] = shape.written(|lambda| figures(lambda, 4), percent);
         let gain = figures(shape.gain, 4);
         vec![
             shape.shape.as_str().into(),
@@ -74,7 +73,10 @@ fn answer(result: &ArrayOptimization) -> Section {
         ]
     };
     body.table(&Table {
-        caption: "Force constants".to_owned(),
+        caption: match result.at_n_per_m {
+            Some(lambda) => format!("Errors at {} N/m", figures(lambda, 4)),
+            None => "Force constants".to_owned(),
+        },
         head: vec![
             ("shape", false),
             ("given array", true),

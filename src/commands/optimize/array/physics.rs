@@ -18,12 +18,13 @@ use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::feedback::{Span, reachable};
 use crate::lambda::vector_feedback::{VectorProblem, reachable_vectors};
-use crate::lambda::{Criterion, ForceProblem, Settings, constant};
+use crate::lambda::{Criterion, ForceProblem, Settings, constant, relative_error};
 use crate::point_weights::Weights;
 use crate::progress::{Interrupted, Progress, Silent, interruptible};
 use crate::scene::single::Single;
 use crate::scene::sources::ShapeSource;
 use crate::scene::{Scene, neighbours, passive, steel};
+use crate::units::FORCE_JND;
 
 /// The force constant that is made as large as possible.
 #[derive(
@@ -55,6 +56,8 @@ pub enum Constant {
     Feedback,
     /// The same for the force vector, nothing sideways
     Vector,
+    /// The least error at the force constant of --lambda, the currents the same everywhere
+    Error,
 }
 
 impl Constant {
@@ -65,10 +68,34 @@ impl Constant {
             Self::Jnd => Some(Criterion::Jnd),
             Self::Saturation => Some(Criterion::Saturation),
             Self::Maxmin => Some(Criterion::Maxmin),
-            Self::Feedback | Self::Vector => None,
+            Self::Feedback | Self::Vector | Self::Error => None,
         }
     }
 }
+
+/// What is made large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aim {
+    /// Which.
+    pub constant: Constant,
+    /// Just-noticeable difference.
+    pub jnd_weight: f64,
+    /// The force constant at which an error is made small, N/m.
+    pub at_n_per_m: Option<f64>,
+}
+
+impl Default for Aim {
+    fn default() -> Self {
+        Self {
+            constant: Constant::default(),
+            jnd_weight: FORCE_JND,
+            at_n_per_m: None,
+        }
+    }
+}
+
+/// Errors below this share are taken for it: nobody feels them, and their inverse has no limit.
+const LEAST_ERROR: f64 = 1e-6;
 
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
@@ -85,8 +112,7 @@ const IRON_SEARCH_TOLERANCE: f64 = 0.1;
 
 /// The shapes over arrays of any design.
 pub struct ArrayPhysics<'a> {
-    constant: Constant,
-    jnd_weight: f64,
+    aim: Aim,
     tolerance: Option<f64>,
     /// Points of every shape, while searching and in the end.
     coarse: Vec<WantedPoints>,
@@ -101,13 +127,13 @@ pub struct ArrayPhysics<'a> {
 }
 
 impl<'a> ArrayPhysics<'a> {
-    /// The points of `shapes`, for one of their force constants.
+    /// The points of `shapes`, for what is made large of them.
     ///
     /// # Errors
     /// A shape that gives no points; interruption.
     pub fn new(
         shapes: &[ShapeSource],
-        (constant, jnd_weight): (Constant, f64),
+        aim: Aim,
         tolerance: Option<f64>,
         progress: &'a dyn Progress,
     ) -> Result<Self, RunError> {
@@ -131,11 +157,10 @@ impl<'a> ArrayPhysics<'a> {
             )
         };
         let all: Vec<_> = coarse.iter().chain(&fine).map(places).collect();
-        let origin = format!("{BUILD} {constant:?} {jnd_weight:?} {tolerance:?} {all:?}");
+        let origin = format!("{BUILD} {aim:?} {tolerance:?} {all:?}");
         Ok(Self {
             origin: sha256_hex(origin.as_bytes()),
-            constant,
-            jnd_weight,
+            aim,
             tolerance,
             coarse,
             fine,
@@ -175,10 +200,12 @@ impl<'a> ArrayPhysics<'a> {
             .sum()
     }
 
-    /// The lowest point of all shapes, m.
-    pub fn lowest_m(&self) -> f64 {
-        let lowest = self.fine.iter().map(WantedPoints::lowest_m);
-        lowest.fold(f64::INFINITY, f64::min)
+    /// Heights of the lowest and the highest point of all shapes, m.
+    pub fn heights_m(&self) -> [f64; 2] {
+        let heights = self.fine.iter().flat_map(|points| &points.height_m);
+        heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
+            [low.min(*z), high.max(*z)]
+        })
     }
 
     /// The tolerance of a level's forces; `None` for the default of the design's physics.
@@ -194,6 +221,34 @@ impl<'a> ArrayPhysics<'a> {
         }
     }
 
+    /// What is made large.
+    pub fn aim(&self) -> Aim {
+        self.aim
+    }
+
+    /// The points of all shapes, raised.
+    pub fn positions_m(&self, raised_m: f64, level: Level) -> Vec<[f64; 3]> {
+        let positions = self
+            .points(level)
+            .iter()
+            .flat_map(|points| &points.positions_m);
+        positions.map(|[x, y, z]| [*x, *y, z + raised_m]).collect()
+    }
+
+    /// The problem of every shape, from one of all their points.
+    pub fn of_shapes<'p>(&'p self, all: ForceProblem<'p>, level: Level) -> Vec<ForceProblem<'p>> {
+        let mut left = all;
+        let shapes = self.points(level).iter().map(|points| {
+            let (own, others) = left.split_at(points.height_m.len());
+            left = others;
+            ForceProblem {
+                weights: points.weights(),
+                ..own
+            }
+        });
+        shapes.collect()
+    }
+
     /// What the design renders; `None` where it renders nothing for some shape.
     ///
     /// # Errors
@@ -205,25 +260,18 @@ impl<'a> ArrayPhysics<'a> {
         level: Level,
     ) -> Result<Option<Physical>, RunError> {
         let scene = Scene::with_tolerance(design, self.tolerance(level, design))?;
-        let points = self.points(level);
-        let raised = |points: &WantedPoints| -> Vec<[f64; 3]> {
-            points
-                .positions_m
-                .iter()
-                .map(|[x, y, z]| [*x, *y, z + raised_m])
-                .collect()
-        };
-        let positions: Vec<[f64; 3]> = points.iter().flat_map(raised).collect();
+        let positions = self.positions_m(raised_m, level);
         let lowest_m = positions.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
         let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
         let coils = scene.coils.len();
-        let sides = match self.constant {
+        let sides = match self.aim.constant {
             Constant::Vector => Some(scene.force_vectors_n_per_a(&solved, &positions, &Silent)?),
             Constant::Linear
             | Constant::Jnd
             | Constant::Saturation
             | Constant::Maxmin
-            | Constant::Feedback => None,
+            | Constant::Feedback
+            | Constant::Error => None,
         };
         let forces = match &sides {
             Some(vectors) => vectors.iter().map(|force| force[2]).collect(),
@@ -236,26 +284,23 @@ impl<'a> ArrayPhysics<'a> {
             false => None,
         };
         let resistance_ohm = scene.resistances_ohm();
-        let (mut lambda_n_per_m, mut first) = (Vec::new(), 0);
-        for points in points {
-            let rows = first..first + points.height_m.len();
-            first = rows.end;
-            let height_m: Vec<f64> = positions[rows.clone()].iter().map(|p| p[2]).collect();
-            let problem = ForceProblem {
-                forces_n_per_a: &forces[rows.start * coils..rows.end * coils],
-                height_m: &height_m,
-                offset_n: pull.as_ref().map(|pull| &pull[rows.clone()]),
-                weights: points.weights(),
-                lower_a: &scene.lower_a,
-                upper_a: &scene.upper_a,
-                total_max_a: design.supply.total_current_max_a,
-                resistance_ohm: &resistance_ohm,
-            };
-            let vectors = sides
-                .as_ref()
-                .map(|all| &all[rows.start * coils..rows.end * coils]);
-            match self.lambda(&problem, vectors, points)? {
-                Some(lambda) if lambda > 0.0 => lambda_n_per_m.push(lambda),
+        let height_m: Vec<f64> = positions.iter().map(|p| p[2]).collect();
+        let all = ForceProblem {
+            forces_n_per_a: &forces,
+            height_m: &height_m,
+            offset_n: pull.as_deref(),
+            weights: None,
+            lower_a: &scene.lower_a,
+            upper_a: &scene.upper_a,
+            total_max_a: design.supply.total_current_max_a,
+            resistance_ohm: &resistance_ohm,
+        };
+        let (mut merits, mut vectors) = (Vec::new(), sides.as_deref());
+        for (points, problem) in self.points(level).iter().zip(self.of_shapes(all, level)) {
+            let own = vectors.map(|all| all.split_at(problem.points() * coils));
+            vectors = own.map(|(_, others)| others);
+            match self.merit(&problem, own.map(|(own, _)| own), points)? {
+                Some(merit) if merit > 0.0 => merits.push(merit),
                 _ => return Ok(None),
             }
         }
@@ -263,7 +308,7 @@ impl<'a> ArrayPhysics<'a> {
         let in_air = neighbours::in_air(&scene, scene.tolerances.inductances);
         let (matrix, _) = neighbours::inductances(&solved, in_air);
         Ok(Some(Physical {
-            lambda_n_per_m,
+            merits,
             inductance_h: if design.has_iron() {
                 largest_self_inductance_h(&matrix)
             } else {
@@ -274,16 +319,21 @@ impl<'a> ArrayPhysics<'a> {
         }))
     }
 
-    fn lambda(
+    /// The force constant, or the inverse of the error; `None` where nothing is rendered.
+    fn merit(
         &self,
         problem: &ForceProblem,
         vectors: Option<&[[f64; 3]]>,
         points: &WantedPoints,
     ) -> Result<Option<f64>, RunError> {
-        if let Some(criterion) = self.constant.criterion() {
+        if let (Constant::Error, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
+            let error = relative_error(problem, lambda_n_per_m)?;
+            return Ok(error.map(|error| error.max(LEAST_ERROR).recip()));
+        }
+        if let Some(criterion) = self.aim.constant.criterion() {
             let settings = Settings {
                 criterion,
-                jnd_weight: self.jnd_weight,
+                jnd_weight: self.aim.jnd_weight,
                 at_n_per_m: None,
             };
             return Ok(constant(problem, &settings)?);

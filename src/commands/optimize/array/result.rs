@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::physics::Constant;
+use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::Input;
 use crate::coil::array_search::search::SearchedChoice;
 use crate::coil::array_search::study::Study;
@@ -24,8 +25,11 @@ pub struct ArrayOptimization {
     pub inputs: Vec<Input>,
     /// How it ended.
     pub status: ArrayEnding,
-    /// The force constant that was made large.
+    /// The force constant that was made large, or the error.
     pub constant: Constant,
+    /// The force constant at which the error was made small, N/m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_n_per_m: Option<f64>,
     /// How several shapes become one number.
     pub objective: &'static str,
     /// That number for the best array: force constants relative to the given design's.
@@ -93,23 +97,38 @@ pub enum ArrayEnding {
 pub struct ShapeGain {
     /// Its name.
     pub shape: String,
-    /// Force constant of the given design, N/m.
-    pub lambda_before_n_per_m: f64,
+    /// Force constant of the given design, N/m; absent where an error is made small.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lambda_before_n_per_m: Option<f64>,
     /// That of the best array, N/m.
-    pub lambda_n_per_m: f64,
-    /// Their ratio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lambda_n_per_m: Option<f64>,
+    /// Error of the given design, relative to the requested force, rms; absent where a force constant is made
+    /// large.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error_before: Option<f64>,
+    /// That of the best array.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error: Option<f64>,
+    /// By what factor the constant is larger, or the error smaller.
     pub gain: f64,
 }
 
 /// What is known of how good the best array is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArrayCertificate {
-    /// `multistart`: the best of several descents; nothing is proven.
-    pub kind: &'static str,
+    /// The proof, or the search.
+    pub kind: CertificateKind,
     /// Descents that came to their end.
     pub starts: usize,
     /// The objective at the end of each.
     pub ends: Vec<f64>,
+    /// No array of the search gains more; null where nothing is proven.
+    pub upper_bound: Option<f64>,
+    /// The bound over the gain, less one.
+    pub gap: Option<f64>,
+    /// Arrays that were computed for the proof.
+    pub cells: usize,
 }
 
 /// One level of accuracy.
@@ -125,4 +144,20 @@ pub struct LevelSummary {
     pub lambda_error: f64,
     /// The same of the ratio of the two, which the search compares.
     pub gain_error: f64,
+}
+
+impl ShapeGain {
+    /// What is made large or small, of the given design and of the best array, each as text.
+    #[must_use]
+    pub fn written(&self, constant: fn(f64) -> String, share: fn(f64) -> String) -> [String; 2] {
+        let one = |lambda: Option<f64>, error: Option<f64>| match (lambda, error) {
+            (Some(lambda), _) => format!("{} N/m", constant(lambda)),
+            (None, Some(error)) => share(error),
+            (None, None) => String::new(),
+        };
+        [
+            one(self.lambda_before_n_per_m, self.relative_error_before),
+            one(self.lambda_n_per_m, self.relative_error),
+        ]
+    }
 }

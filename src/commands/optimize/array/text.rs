@@ -1,6 +1,8 @@
 //! The summary of `optimize --for`.
 
+use super::physics::Constant;
 use super::{ArrayEnding, ArrayOptimization};
+use crate::accuracy::CertificateKind;
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::limit_row;
 use crate::cli::quantity::{count, number, percent, si};
@@ -60,9 +62,20 @@ pub fn summary(
 
 /// How it ended, and how sure it is.
 pub fn ended(result: &ArrayOptimization) -> String {
+    let certificate = &result.certificate;
+    let known = match certificate.gap {
+        Some(gap) => format!("proven: no pitch gains {} more", percent(gap.max(0.0))),
+        None if certificate.kind == CertificateKind::Exhaustive => {
+            "every one of the search is among them".to_owned()
+        }
+        None => certificate.kind.open_question().to_owned(),
+    };
+    let descents = match certificate.starts {
+        0 => String::new(),
+        starts => format!("{} over ", count(starts, "descent")),
+    };
     let searched = format!(
-        "best of {} over {} that were computed; nothing is proven",
-        count(result.certificate.starts.max(1), "descent"),
+        "best of {descents}{} that were computed; {known}",
         count(result.evaluations, "array")
     );
     match result.status {
@@ -105,16 +118,21 @@ pub fn one_more(limit: &LimitWorth) -> String {
 }
 
 fn shapes(result: &ArrayOptimization) -> String {
-    let head = ["shape", "before", "lambda", "gain"]
+    let what = match result.constant {
+        Constant::Error => "error",
+        Constant::Linear
+        | Constant::Jnd
+        | Constant::Saturation
+        | Constant::Maxmin
+        | Constant::Feedback
+        | Constant::Vector => "lambda",
+    };
+    let head = ["shape", "before", what, "gain"]
         .map(str::to_owned)
         .to_vec();
     let row = |shape: &super::ShapeGain| {
-        vec![
-            shape.shape.clone(),
-            format!("{} N/m", number(shape.lambda_before_n_per_m)),
-            format!("{} N/m", number(shape.lambda_n_per_m)),
-            number(shape.gain),
-        ]
+        let [before, now] = shape.written(number, percent);
+        vec![shape.shape.clone(), before, now, number(shape.gain)]
     };
     let rows: Vec<_> = std::iter::once(head)
         .chain(result.shapes.iter().map(row))

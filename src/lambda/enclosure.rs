@@ -1,0 +1,236 @@
+//! Upper bounds of lambda_jnd over all forces between two that are known.
+//!
+//! A force constant lambda is above lambda_jnd where e*(lambda) / lambda^2 > e_0 + w^2 <h^2>, e_0 being
+//! the least error without the drivers' size per unit of lambda^2 and <> the mean over the points. Of
+//! any numbers z at the points and any currents y that e_0 allows,
+//!
+//! e*(lambda) / lambda^2 >= 2 <z h> - <z^2> - 2/lambda max_I <z G I>    (Fenchel; the maximum within the limits),
+//! e_0 <= <(h - G y)^2>,
+//!
+//! so that lambda_jnd <= 2 max_I <z G I> / (2 <z h> - <z^2> - <(h - G y)^2> - w^2 <h^2>) where the
+//! denominator is above zero. With z and y of the solution this is lambda_jnd itself. Both bounds are
+//! convex in G for fixed z and y: on a straight line between two matrices their ends decide, and what
+//! the line misses is of second order in its length, as is what the true forces may be off it.
+
+use fluxform_numerics::real::Real;
+
+use super::certificate::best_within_limits;
+use super::path::Path;
+use super::problem::{ForceProblem, ProblemError, Settings};
+use super::qr_reduction::{largest_entries, times_power};
+use super::solve::solve_paths;
+
+/// The currents that decide lambda_jnd.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JndCurrents {
+    /// lambda_jnd, N/m.
+    pub lambda_n_per_m: f64,
+    /// The best currents there, A.
+    pub limited_a: Vec<f64>,
+    /// The best ones without the drivers' size, A for each N/m.
+    pub unlimited_a_per_n_per_m: Vec<f64>,
+}
+
+/// The currents of a problem without offset; `None` where lambda_jnd is not above zero, or has no limit.
+///
+/// # Errors
+/// As [`super::solve`].
+pub fn jnd_currents(
+    problem: &ForceProblem,
+    jnd_weight: f64,
+) -> Result<Option<JndCurrents>, ProblemError> {
+    let settings = Settings {
+        jnd_weight,
+        ..Settings::default()
+    };
+    problem.validate(&settings)?;
+    let largest = largest_entries(problem);
+    problem.comparable(&largest)?;
+    let (solved, _, _) = solve_paths(problem, &largest);
+    let Some(scaled) = solved.comparison().jnd(jnd_weight) else {
+        return Ok(None);
+    };
+    let reduced = &solved.reduced;
+    let lambda_n_per_m = times_power(scaled.to_f64(), reduced.lambda_scale);
+    if !solved.reliable() || problem.offset_n.is_some() || lambda_n_per_m <= 0.0 {
+        return Ok(None);
+    }
+    let path = Path::new(problem, reduced, &solved.bounds, &solved.limited);
+    // Without offset e_0 has one piece.
+    let rates = &solved.unlimited.pieces[0].x_rate;
+    let unlimited = rates.iter().take(problem.coils()).enumerate();
+    Ok(Some(JndCurrents {
+        lambda_n_per_m,
+        limited_a: path.currents_a(lambda_n_per_m),
+        unlimited_a_per_n_per_m: unlimited
+            .map(|(i, rate)| {
+                let directions = problem.directions(i);
+                let rate = times_power(
+                    rate.to_f64(),
+                    -reduced.lambda_scale - reduced.current_scale(i),
+                );
+                rate.clamp(
+                    if directions.down {
+                        f64::NEG_INFINITY
+                    } else {
+                        0.0
+                    },
+                    if directions.up { f64::INFINITY } else { 0.0 },
+                )
+            })
+            .collect(),
+    }))
+}
+
+/// Two problems that differ in their forces alone, with the currents that decide either.
+#[derive(Debug, Clone, Copy)]
+pub struct Between<'a> {
+    /// The problems.
+    pub ends: [&'a ForceProblem<'a>; 2],
+    /// Their currents.
+    pub currents: [&'a JndCurrents; 2],
+}
+
+/// Sums over points in doubles, relative, many times over.
+const ROUNDING: f64 = 1e-11;
+
+impl Between<'_> {
+    /// No forces that lie between both ends' but for `off_n_per_a`, [point, coil], have a larger
+    /// lambda_jnd, N/m; infinite where nothing is proven.
+    #[must_use]
+    pub fn jnd_bound_n_per_m(&self, off_n_per_a: &[f64], jnd_weight: f64) -> f64 {
+        let [first, _] = self.ends;
+        let coils = first.coils();
+        let row = |all: &[f64], j: usize| all[j * coils..(j + 1) * coils].to_vec();
+        let (mut height, mut dual, mut total) = (0.0, 0.0, 0.0);
+        // Of both ends: the error of y, and the gradient <z G>.
+        let mut unlimited = [0.0; 2];
+        let mut gradient = [vec![0.0; coils], vec![0.0; coils]];
+        // What the forces may be off the line adds to either.
+        let (mut unlimited_off, mut gradient_off) = (0.0, vec![0.0; coils]);
+        let y: Vec<f64> = (0..coils)
+            .map(|i| self.mean(|one| one.unlimited_a_per_n_per_m[i]))
+            .collect();
+        for (j, h) in first.height_m.iter().enumerate() {
+            let weight = first.weights.map_or(1.0, |weights| weights[j]);
+            let forces = self.ends.map(|end| row(end.forces_n_per_a, j));
+            let residual = |end: usize| {
+                let one = self.currents[end];
+                let given: f64 = (0..coils).map(|i| forces[end][i] * one.limited_a[i]).sum();
+                h - given / one.lambda_n_per_m
+            };
+            let z = 0.5 * (residual(0) + residual(1));
+            total += weight;
+            height += weight * h * h;
+            dual += weight * z * (2.0 * h - z);
+            let off = row(off_n_per_a, j);
+            for end in 0..2 {
+                let given: f64 = forces[end].iter().zip(&y).map(|(g, y)| g * y).sum();
+                unlimited[end] += weight * (h - given).powi(2);
+                for (sum, g) in gradient[end].iter_mut().zip(&forces[end]) {
+                    *sum += weight * z * g;
+                }
+            }
+            let given: f64 = off.iter().zip(&y).map(|(g, y)| g * y.abs()).sum();
+            unlimited_off += weight * given * given;
+            for (sum, g) in gradient_off.iter_mut().zip(&off) {
+                *sum += weight * z.abs() * g;
+            }
+        }
+        let off: f64 = (0..coils).map(|i| first.reach_a(i) * gradient_off[i]).sum();
+        let known = dual - jnd_weight * jnd_weight * height;
+        let bound = |end: usize| {
+            let best = best_within_limits(first, &gradient[end]);
+            let most: f64 = best.iter().zip(&gradient[end]).map(|(i, g)| i * g).sum();
+            let error = (unlimited[end].sqrt() + unlimited_off.sqrt()).powi(2);
+            let room = known - error - ROUNDING * height;
+            if room > 0.0 && total > 0.0 {
+                2.0 * (most + off).max(0.0) / room * (1.0 + ROUNDING)
+            } else {
+                f64::INFINITY
+            }
+        };
+        bound(0).max(bound(1))
+    }
+
+    fn mean(&self, of: impl Fn(&JndCurrents) -> f64) -> f64 {
+        0.5 * self.currents.iter().map(|one| of(one)).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constant;
+
+    const HEIGHTS: [f64; 6] = [0.3, 0.5, 0.45, 0.7, 0.35, 0.6];
+
+    /// Three coils that move along six points.
+    fn forces(place: f64) -> Vec<f64> {
+        let at = |j: usize, i: usize| {
+            let apart = 0.9 * j as f64 - place * (1.3 + 1.1 * i as f64);
+            0.2 / (1.0 + apart * apart)
+        };
+        (0..6).flat_map(|j| (0..3).map(move |i| at(j, i))).collect()
+    }
+
+    fn problem(forces_n_per_a: &[f64]) -> ForceProblem<'_> {
+        ForceProblem {
+            forces_n_per_a,
+            height_m: &HEIGHTS,
+            offset_n: None,
+            weights: Some(&[1.0, 0.7, 1.3, 1.0, 0.9, 1.1]),
+            lower_a: &[0.0, -0.4, 0.0],
+            upper_a: &[2.0, 1.5, 1.7],
+            total_max_a: Some(3.9),
+            resistance_ohm: &[6.0; 3],
+        }
+    }
+
+    fn bound(places: [f64; 2], off: f64) -> f64 {
+        let all = places.map(forces);
+        let [a, b] = [problem(&all[0]), problem(&all[1])];
+        let currents = [&a, &b].map(|one| jnd_currents(one, 0.07).unwrap().unwrap());
+        let between = Between {
+            ends: [&a, &b],
+            currents: [&currents[0], &currents[1]],
+        };
+        between.jnd_bound_n_per_m(&[off; 18], 0.07)
+    }
+
+    fn lambda(place: f64) -> f64 {
+        let forces = forces(place);
+        constant(&problem(&forces), &Settings::default())
+            .unwrap()
+            .unwrap()
+    }
+
+    #[test]
+    fn the_bound_is_the_constant_where_both_ends_are_the_same() {
+        for place in [0.6, 0.8, 1.1] {
+            let share = bound([place; 2], 0.0) / lambda(place);
+            assert!((0.0..1e-9).contains(&(share - 1.0)), "{place}: {share}");
+        }
+    }
+
+    /// It encloses what lies between, and comes closer with the square of the distance: a Taylor test of
+    /// both bounds.
+    #[test]
+    fn the_bound_encloses_a_fine_scan_and_its_gap_falls_with_the_square() {
+        let gap = |half: f64| {
+            let ends = [0.8 - half, 0.8 + half];
+            // |d2/dx2 0.2/(1 + x^2)| <= 0.4, x = place times 3.5 at most.
+            let off = 0.4 * 3.5 * 3.5 * (2.0 * half).powi(2) / 8.0;
+            let most = (0..=200)
+                .map(|k| lambda(ends[0] + half * f64::from(k) / 100.0))
+                .fold(0.0, f64::max);
+            let bound = bound(ends, off);
+            assert!(bound >= most, "{half}: {bound} {most}");
+            bound / most - 1.0
+        };
+        let gaps = [4e-3, 2e-3, 1e-3].map(gap);
+        for pair in gaps.windows(2) {
+            assert!((3.0..6.0).contains(&(pair[0] / pair[1])), "{gaps:?}");
+        }
+    }
+}
