@@ -37,9 +37,9 @@ pub struct DesignDocument {
 }
 
 impl DesignDocument {
-    /// The other file that it names, which is read when the design is computed.
-    pub fn also_read(&self) -> impl Iterator<Item = &Path> {
-        self.design.curve_file().into_iter()
+    /// The other files that it names, which are read when the design is computed.
+    pub fn also_read(&self) -> impl Iterator<Item = PathBuf> {
+        self.design.named_files().into_iter().map(|file| file.path)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Steel beyond the cores: `[plate]` below them and bodies `[[iron]]`.
 
+use std::path::PathBuf;
+
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use super::reader::{Located, Section};
@@ -75,7 +77,7 @@ impl Plate {
 }
 
 /// The shape of a body about its middle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum IronShape {
     /// Sides along x, y and z, m.
     Box([f64; 3]),
@@ -83,14 +85,21 @@ pub enum IronShape {
     Tube([f64; 3]),
     /// Diameter, m.
     Ball(f64),
+    /// A closed surface of triangles, about its file's origin.
+    Mesh {
+        /// Its file, the path resolved against the design file's folder.
+        surface: PathBuf,
+        /// Metres of the file's unit, where the design states it.
+        unit_m: Option<f64>,
+    },
 }
 
 /// A body of steel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Iron {
     /// Its shape.
     pub shape: IronShape,
-    /// Its middle, m.
+    /// Its middle; of a mesh where its file's origin is, m.
     pub centre_m: [f64; 3],
     /// Rotation about x, then y, then z, degrees.
     pub rotate_deg: [f64; 3],
@@ -195,6 +204,47 @@ enum Kind {
     Tube,
     /// A ball.
     Ball,
+    /// A closed mesh.
+    Mesh,
+}
+
+/// What a kind of body must have.
+fn required(kind: Kind) -> &'static [&'static str] {
+    match kind {
+        Kind::Box => &["size_mm"],
+        Kind::Cylinder => &["diameter_mm", "length_mm"],
+        Kind::Tube => &["diameter_mm", "inner_diameter_mm", "length_mm"],
+        Kind::Ball => &["diameter_mm"],
+        Kind::Mesh => &["surface"],
+    }
+}
+
+/// What it may have also, and where it is.
+fn optional(kind: Kind) -> &'static [&'static str] {
+    match kind {
+        Kind::Mesh => &["unit", "translate_mm"],
+        Kind::Box | Kind::Cylinder | Kind::Tube | Kind::Ball => &["center_mm"],
+    }
+}
+
+/// Reports keys that the kind of body lacks, and those that it does not have.
+fn check_keys(s: &Section<'_>, kind: Kind) {
+    let (required, optional) = (required(kind), optional(kind));
+    let all = <Kind as VariantArray>::VARIANTS.iter();
+    let mut keys: Vec<&str> = all
+        .flat_map(|kind| [self::required(*kind), self::optional(*kind)].concat())
+        .collect();
+    keys.sort_unstable();
+    keys.dedup();
+    for key in keys {
+        let message = match (s.has(key), required.contains(&key)) {
+            (false, true) => "this shape needs this key, which is missing",
+            (true, false) if !optional.contains(&key) => "this shape has no such key",
+            _ => continue,
+        };
+        let has = [required, optional].concat().join(", ");
+        s.fault(key, message, &format!("it has {has}"));
+    }
 }
 
 pub(super) fn body(mut s: Section<'_>) -> Option<Iron> {
@@ -211,25 +261,17 @@ pub(super) fn body(mut s: Section<'_>) -> Option<Iron> {
     let diameter = s.number("diameter_mm", &size);
     let inner = s.number("inner_diameter_mm", &size);
     let length = s.number("length_mm", &size);
-    let centre = s.tuple("center_mm", &BODY_MM);
+    let surface = s.text("surface").map(|text| text.value);
+    let unit_m = s.length_unit("unit");
+    let centre = s.tuple::<3>("center_mm", &BODY_MM);
+    let translate = s.tuple::<3>("translate_mm", &BODY_MM);
     let rotate_deg = s.tuple("rotate_deg", &Rule::any("degrees"));
     let steel = steel(&mut s);
-    let keys: &[&str] = match kind {
-        None => &[],
-        Some(Kind::Box) => &["size_mm"],
-        Some(Kind::Cylinder) => &["diameter_mm", "length_mm"],
-        Some(Kind::Tube) => &["diameter_mm", "inner_diameter_mm", "length_mm"],
-        Some(Kind::Ball) => &["diameter_mm"],
-    };
-    for key in ["size_mm", "diameter_mm", "inner_diameter_mm", "length_mm"] {
-        if kind.is_some() && s.has(key) != keys.contains(&key) {
-            let message = if s.has(key) {
-                "this shape has no such size"
-            } else {
-                "this shape needs this size, which is missing"
-            };
-            s.fault(key, message, &format!("it has {}", keys.join(", ")));
-        }
+    if let Some(kind) = kind {
+        check_keys(&s, kind);
+    }
+    if surface.as_deref() == Some("") {
+        s.fault("surface", "expected a file", "name the file of the mesh");
     }
     let of = |value: Option<Located<f64>>| value.map_or(0.0, |v| m_from_mm(v.value));
     let [inner, outer, length] = [of(inner), of(diameter), of(length)];
@@ -243,8 +285,13 @@ pub(super) fn body(mut s: Section<'_>) -> Option<Iron> {
             Kind::Box => IronShape::Box(sides?.map(m_from_mm)),
             Kind::Cylinder | Kind::Tube => IronShape::Tube([inner, outer, length]),
             Kind::Ball => IronShape::Ball(outer),
+            Kind::Mesh => IronShape::Mesh {
+                surface: PathBuf::from(surface?),
+                unit_m,
+            },
         },
-        centre_m: centre.map(m_from_mm),
+        // The other kind's key is at fault, hence nothing.
+        centre_m: [0, 1, 2].map(|k| m_from_mm(centre[k] + translate[k])),
         rotate_deg,
         steel,
     })

@@ -101,7 +101,19 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     ("iron.inner_diameter_mm", "of a tube"),
     ("iron.length_mm", "of a cylinder or a tube"),
-    ("iron.center_mm", "its middle"),
+    (
+        "iron.surface",
+        "the file of a closed mesh, beside the design",
+    ),
+    (
+        "iron.unit",
+        "of the mesh's coordinates, where its file carries none",
+    ),
+    ("iron.center_mm", "its middle; not of a mesh"),
+    (
+        "iron.translate_mm",
+        "of a mesh: where its file's origin goes",
+    ),
     ("iron.rotate_deg", "rotation about x, then y, then z"),
     ("iron.relative_permeability", "of its linear steel"),
     ("iron.knee_t", "flux density from which its steel saturates"),

@@ -1,10 +1,11 @@
 //! The contents of a design file, validated, in SI units.
 
-use super::iron::{Iron, Plate};
+use super::iron::{Iron, IronShape, Plate};
 use super::key::Assumed;
 use super::limits::Limits;
+use super::named_file::{NamedFile, Role};
 use super::search::SearchSpace;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use fluxform_base::heating::Cooling;
@@ -95,13 +96,35 @@ impl Design {
         }
     }
 
-    /// The B-H table that it names.
+    /// The files that it names, in the order in which inputs and bundles list them.
     #[must_use]
-    pub fn curve_file(&self) -> Option<&Path> {
-        match &self.core.as_ref()?.steel {
-            Steel::Curve(path) => Some(path),
-            Steel::Linear(_) => None,
+    pub fn named_files(&self) -> Vec<NamedFile> {
+        let mut own = self.clone();
+        let files = own.named_files_mut().into_iter();
+        files
+            .map(|(role, path)| NamedFile {
+                role,
+                path: std::mem::take(path),
+            })
+            .collect()
+    }
+
+    /// What each of them is, and its path, which may be replaced.
+    pub fn named_files_mut(&mut self) -> Vec<(Role, &mut PathBuf)> {
+        let mut files = Vec::new();
+        if let Some(Core {
+            steel: Steel::Curve(path),
+            ..
+        }) = &mut self.core
+        {
+            files.push((Role::Curve, path));
         }
+        for (number, iron) in self.iron.iter_mut().enumerate() {
+            if let IronShape::Mesh { surface, .. } = &mut iron.shape {
+                files.push((Role::Mesh(number), surface));
+            }
+        }
+        files
     }
 }
 

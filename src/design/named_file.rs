@@ -9,7 +9,50 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// What a file that a design names is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The table of the cores' magnetisation.
+    Curve,
+    /// The mesh of a body of `[[iron]]`, counted from 0.
+    Mesh(usize),
+}
+
+/// A file that a design names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// What it is.
+    pub role: Role,
+    /// Where it is.
+    pub path: PathBuf,
+}
+
+impl NamedFile {
+    /// The key that names it.
+    #[must_use]
+    pub fn key(&self) -> String {
+        match self.role {
+            Role::Curve => "core.bh_curve".to_owned(),
+            Role::Mesh(number) => format!("iron[{number}].surface"),
+        }
+    }
+
+    /// Its name in a bundle: of a mesh with the ending, which states its format.
+    #[must_use]
+    pub fn kept_name(&self) -> String {
+        match self.role {
+            Role::Curve => "bh_curve.csv".to_owned(),
+            Role::Mesh(number) => {
+                let ending = self.path.extension().and_then(|ending| ending.to_str());
+                let plain = |ending: &&str| ending.chars().all(|c| c.is_ascii_alphanumeric());
+                let ending = ending.filter(plain).map(|ending| format!(".{ending}"));
+                format!("iron_{number}{}", ending.unwrap_or_default())
+            }
+        }
+    }
+}
 
 /// Why a file that a document names is not read.
 #[derive(Debug, thiserror::Error)]

@@ -1,10 +1,11 @@
 //! Reading a design file: text to a validated [`Design`], or every fault in it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::checks;
 use super::diagnostics::{Faults, InvalidDocument};
 use super::draft::{Draft, Need};
+use super::iron::{Iron, IronShape};
 use super::model::{
     Array, BANDWIDTH_HZ, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace,
 };
@@ -17,7 +18,7 @@ use fluxform_base::units::m_from_mm;
 
 impl Design {
     /// The design that `text` describes, and the warnings about it. `path` names it in messages
-    /// and its folder is where a relative `bh_curve` is looked for.
+    /// and its folder is where files that it names are looked for.
     ///
     /// # Errors
     /// Every fault found.
@@ -73,7 +74,11 @@ impl Draft {
             wire: wire_m(self.wire),
             core: self.core.map(|core| core_m(core, path)),
             plate: self.plate,
-            iron: self.iron,
+            iron: self
+                .iron
+                .into_iter()
+                .map(|iron| iron_m(iron, path))
+                .collect(),
             array: Array {
                 positions_m,
                 grid: match self.array.layout {
@@ -123,19 +128,30 @@ fn wire_m(draft: WireDraft) -> Wire {
 }
 
 fn core_m(draft: CoreDraft, path: &Path) -> Core {
-    let beside = |file: String| path.parent().unwrap_or(Path::new("")).join(file);
     Core {
         clearance_m: m_from_mm(draft.clearance.value),
         above_m: m_from_mm(draft.above.value),
         below_m: m_from_mm(draft.below.value),
         knee_t: draft.knee_t,
         steel: match draft.bh_curve {
-            Some(file) => Steel::Curve(beside(file)),
+            Some(file) => Steel::Curve(beside(path, file)),
             None => Steel::Linear(draft.relative_permeability),
         },
         conductivity_s_per_m: draft.conductivity_s_per_m,
         lamination_m: draft.lamination.map(m_from_mm),
     }
+}
+
+fn iron_m(mut iron: Iron, path: &Path) -> Iron {
+    if let IronShape::Mesh { surface, .. } = &mut iron.shape {
+        *surface = beside(path, &*surface);
+    }
+    iron
+}
+
+/// A file that the design at `path` names.
+fn beside(path: &Path, file: impl AsRef<Path>) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(file)
 }
 
 fn magnet_m(draft: &MagnetDraft) -> Magnet {

@@ -1,6 +1,7 @@
 //! The typed values of a section: numbers, lists, axes, texts, choices.
 
 use fluxform_base::choice::Choice;
+use fluxform_base::length_unit::{parse_unit, unit_names};
 use toml::Spanned;
 use toml::de::DeValue;
 
@@ -294,6 +295,24 @@ impl<'a> Section<'a> {
                 None
             }
         }
+    }
+
+    /// A unit of length, m; `None` where absent or at fault.
+    pub fn length_unit(&mut self, key: &'static str) -> Option<f64> {
+        let unit = self.text(key)?.value;
+        let metres = parse_unit(&unit);
+        if metres.is_none() {
+            let names = unit_names();
+            let message = format!("expected {}, found {}", names.join(", "), quoted(&unit));
+            let help = nearest(&unit, &names).map(|near| format!("did you mean {near:?}?"));
+            self.fault(
+                key,
+                message,
+                help.as_deref()
+                    .unwrap_or("name the unit of the file's coordinates"),
+            );
+        }
+        metres
     }
 
     /// A required text; `None` where absent or at fault.

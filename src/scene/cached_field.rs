@@ -58,10 +58,9 @@ pub struct FieldStore {
 }
 
 impl FieldStore {
-    /// The field of `scene`, with the text of its magnetisation curve's table if it
-    /// has one, in `store`. Without steel nothing is cached: computing is faster than reading.
+    /// The field of `scene` in `store`. Without steel nothing is cached: computing is faster than reading.
     #[must_use]
-    pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
+    pub fn new(scene: &Scene, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
         let store = if design.core.is_some() || design.has_iron() {
@@ -86,9 +85,10 @@ impl FieldStore {
         let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
         if let Some(Described::Curve(_)) = design.core.as_ref().map(|core| &core.steel) {
             // Along a curve the rated current counts too.
-            let supply = format!("{:?}", design.supply);
-            let table = curve.unwrap_or_default();
-            field = field.and(supply.as_bytes()).and(table.as_bytes());
+            field = field.and(format!("{:?}", design.supply).as_bytes());
+        }
+        for file in &scene.files {
+            field = field.and(&file.bytes);
         }
         Self {
             store,

@@ -1,8 +1,10 @@
 //! The steel of a design's cores: where it is and how it magnetises.
 
+use super::named_files::{self, NamedContent};
 use crate::RunError;
 use crate::design::bh_table::BhTable;
-use crate::design::{Core, Steel as Described, source};
+use crate::design::named_file::Role;
+use crate::design::{Core, Steel as Described};
 use crate::field::steel::CoreShape;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::winding::Winding;
@@ -24,8 +26,6 @@ pub struct SceneCore {
     conductivity_s_per_m: f64,
     /// Thickness of its sheets, m.
     lamination_m: Option<f64>,
-    /// The table of the magnetisation curve as it was parsed.
-    pub curve_text: Option<String>,
     /// Warnings about the material.
     pub warnings: Vec<String>,
 }
@@ -60,26 +60,23 @@ impl SceneCore {
         self.conductivity_s_per_m * (share * share).min(1.0)
     }
 
-    /// The core that `core` describes in the bore of `winding`.
+    /// The core that `core` describes in the bore of `winding`; its B-H table is among `files`.
     ///
     /// # Errors
-    /// A B-H table that cannot be read or cannot be a steel's.
-    pub fn new(core: &Core, winding: &Winding) -> Result<Self, RunError> {
+    /// A B-H table that cannot be a steel's.
+    pub fn new(core: &Core, winding: &Winding, files: &[NamedContent]) -> Result<Self, RunError> {
         let shape = CoreShape {
             radius_m: winding.inner_radius_m - core.clearance_m,
             bottom_m: -(winding.length_m + core.below_m),
             top_m: core.above_m,
         };
         let mut warnings = Vec::new();
-        let mut curve_text = None;
         let (material, knee_t) = match &core.steel {
             Described::Linear(mu_r) => (Material::Linear(*mu_r), core.knee_t),
             Described::Curve(path) => {
-                let text = source::table_text_of(path);
-                let text = text.map_err(|fault| RunError::Input(fault.to_string()))?;
-                let table = BhTable::from_csv(&text, path)
+                let text = named_files::of(files, Role::Curve)?.text()?;
+                let table = BhTable::from_csv(text, path)
                     .map_err(|fault| RunError::Input(fault.to_string()))?;
-                curve_text = Some(text);
                 let curve = BhCurve::new(&table.b_t, &table.h_a_per_m).map_err(|fault| {
                     RunError::Input(format!("core.bh_curve {}: {fault}", path.display()))
                 })?;
@@ -94,7 +91,6 @@ impl SceneCore {
             knee_t: knee_t.unwrap_or(f64::INFINITY),
             conductivity_s_per_m: core.conductivity_s_per_m,
             lamination_m: core.lamination_m,
-            curve_text,
             warnings,
         })
     }

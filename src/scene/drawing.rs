@@ -1,14 +1,21 @@
 //! A design as a drawing of its array.
 
-use crate::design::iron::{Hole, Iron, Plate, PlateOutline};
+use crate::design::iron::{Hole, Plate, PlateOutline};
 use crate::design::{Coil, Design};
 use crate::field::iron::bodies::{self, Solid};
 use crate::plot::array::{ArrayPlot, Body, Part, Role};
-use crate::scene::iron::{body, middle};
+use crate::scene::iron::middle;
 
-/// The array of `design` with its coils, the magnet and the workspace; `None` without a coil.
+/// Ends of sections that are one, m.
+const SAME_M: f64 = 1e-9;
+
+/// The array of `design` with its coils, the magnet, the workspace and the bodies of its `[[iron]]`; `None` without
+/// a coil.
 #[must_use]
-pub fn drawing(design: &Design) -> Option<ArrayPlot> {
+pub fn drawing<'a>(
+    design: &Design,
+    iron: impl IntoIterator<Item = &'a bodies::Body>,
+) -> Option<ArrayPlot> {
     let coil = design.coil?;
     let axes = &design.array.positions_m;
     let distance = |axis: &[f64; 2]| axis[0].hypot(axis[1]);
@@ -27,8 +34,8 @@ pub fn drawing(design: &Design) -> Option<ArrayPlot> {
         let drawn = |hole| part(Role::Plate, hole_body(hole, z_m, middle[1]));
         parts.extend(plate.holes.iter().map(drawn));
     }
-    for iron in &design.iron {
-        parts.extend(iron_parts(iron, middle[1]));
+    for body in iron {
+        parts.extend(iron_parts(body, middle[1]));
     }
     let (half, centre) = (0.5 * design.magnet.length_m, design.target_height_m);
     parts.push(part(
@@ -84,61 +91,142 @@ fn plate_body(design: &Design, plate: &Plate, z_m: [f64; 2]) -> Body {
 }
 
 /// A body of steel cut at `section_y_m`, and its bore.
-fn iron_parts(iron: &Iron, section_y_m: f64) -> Vec<Part> {
-    let level = iron.rotate_deg[..2].iter().all(|angle| *angle == 0.0);
+fn iron_parts(body: &bodies::Body, section_y_m: f64) -> Vec<Part> {
+    if let Solid::Mesh(_) = body.solid {
+        return mesh_parts(body, section_y_m);
+    }
     let outlines = |solid: Solid, hollow: bool| {
         let solid = bodies::Body {
             solid,
-            ..body(iron)
+            ..body.clone()
         };
+        let level = body.turn[2][2].abs() == 1.0;
         // From above the bore of a body that lies is not seen.
         outlines(&solid, section_y_m, level || !hollow, hollow)
     };
-    let whole = body(iron).solid;
-    let bore = match whole {
+    let bore = match body.solid {
         Solid::Tube([inner, _, length]) if inner > 0.0 => Some(Solid::Tube([0.0, inner, length])),
-        Solid::Tube(_) | Solid::Box(_) | Solid::Ball(_) => None,
+        Solid::Tube(_) | Solid::Box(_) | Solid::Ball(_) | Solid::Mesh(_) => None,
     };
     let bore = bore.map(|bore| part(Role::Iron, outlines(bore, true)));
-    let whole = part(Role::Iron, outlines(whole, false));
+    let whole = part(Role::Iron, outlines(body.solid.clone(), false));
     std::iter::once(whole).chain(bore).collect()
 }
 
 /// A body's outlines from above, where that is seen, and where it is cut at `section_y_m`.
 fn outlines(solid: &bodies::Body, section_y_m: f64, above: bool, hollow: bool) -> Body {
-    let places: Vec<[f64; 3]> = solid.places_m().collect();
-    let ends = |axis: usize| {
-        let values = places.iter().map(|place| place[axis]);
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        })
-    };
+    let (places, cells) = solid.drawn();
     let from_above = places.iter().filter(|_| above);
+    let cuts = cells
+        .iter()
+        .flat_map(|cell| cut(&places, cell, section_y_m));
     Body::Outlines {
-        ends_m: [0, 1, 2].map(ends),
+        ends_m: ends_m(&places),
         plan_m: convex_hull(from_above.map(|place| [place[0], place[1]]).collect()),
-        section_m: convex_hull(crossings(&places, section_y_m)),
+        section_m: convex_hull(cuts.collect()),
         hollow,
     }
 }
 
-/// Where the lines between neighbours on the faces' grids pass through the plane at `y_m`, by x and z.
-fn crossings(places: &[[f64; 3]], y_m: f64) -> Vec<[f64; 2]> {
-    let side = bodies::Body::STEPS + 1;
+/// A mesh: from above its convex outline, and every loop in which the section cuts it, those inside others as holes.
+fn mesh_parts(body: &bodies::Body, section_y_m: f64) -> Vec<Part> {
+    let (places, facets) = body.drawn();
+    let cuts = facets.iter().map(|facet| cut(&places, facet, section_y_m));
+    let loops = loops(
+        cuts.filter_map(|cut| <[[f64; 2]; 2]>::try_from(cut).ok())
+            .collect(),
+    );
+    let used = facets
+        .iter()
+        .flatten()
+        .map(|k| places[*k])
+        .collect::<Vec<_>>();
+    let outlines = |plan_m, section_m: Vec<[f64; 2]>, hollow| {
+        let ends_m = ends_m(&used);
+        part(
+            Role::Iron,
+            Body::Outlines {
+                ends_m,
+                plan_m,
+                section_m,
+                hollow,
+            },
+        )
+    };
+    let plan = convex_hull(used.iter().map(|place| [place[0], place[1]]).collect());
+    let mut parts = vec![outlines(plan, Vec::new(), false)];
+    let around = |inner: &[[f64; 2]]| {
+        let others = loops.iter().filter(|other| other.as_slice() != inner);
+        others.filter(|other| is_inside(other, inner[0])).count()
+    };
+    let mut sorted: Vec<(usize, &Vec<[f64; 2]>)> =
+        loops.iter().map(|own| (around(own), own)).collect();
+    sorted.sort_by_key(|(around, _)| *around);
+    let sections = sorted.into_iter();
+    parts.extend(sections.map(|(around, own)| outlines(Vec::new(), own.clone(), around % 2 == 1)));
+    parts
+}
+
+/// Whether a point is inside a polygon, by the sides to its right.
+fn is_inside(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let next = polygon.iter().cycle().skip(1);
+    let crossed = polygon.iter().zip(next).filter(|(a, b)| {
+        (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Polygons of segments that end where others begin.
+fn loops(mut segments: Vec<[[f64; 2]; 2]>) -> Vec<Vec<[f64; 2]>> {
+    let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
     let mut out = Vec::new();
-    for face in places.chunks_exact(side * side) {
-        let across = (0..side * side)
-            .filter(|k| (k + 1) % side > 0)
-            .map(|k| [k, k + 1]);
-        let along = (0..side * (side - 1)).map(|k| [k, k + side]);
-        for [a, b] in across.chain(along).map(|pair| pair.map(|k| face[k])) {
-            let share = (y_m - a[1]) / (b[1] - a[1]);
-            if (0.0..=1.0).contains(&share) {
-                out.push([a[0] + share * (b[0] - a[0]), a[2] + share * (b[2] - a[2])]);
+    while let Some([first, mut last]) = segments.pop() {
+        let mut polygon = vec![first, last];
+        loop {
+            let nearest = (0..segments.len())
+                .flat_map(|k| [(k, 0), (k, 1)])
+                .map(|(k, end)| (apart(segments[k][end], last), k, end))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            match nearest {
+                Some((gap_m, k, end)) if gap_m < SAME_M => {
+                    last = segments.swap_remove(k)[1 - end];
+                    polygon.push(last);
+                }
+                _ => break,
             }
+        }
+        if polygon.len() > 3 {
+            polygon.pop();
+            out.push(polygon);
         }
     }
     out
+}
+
+/// Ends along x, y and z.
+fn ends_m(places: &[[f64; 3]]) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|axis| {
+        let values = places.iter().map(|place| place[axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
+    })
+}
+
+/// Where a polygon's sides pass through the plane at `y_m`, by x and z.
+fn cut(places: &[[f64; 3]], polygon: &[usize], y_m: f64) -> Vec<[f64; 2]> {
+    let next = polygon.iter().cycle().skip(1);
+    let sides = polygon
+        .iter()
+        .zip(next)
+        .map(|(a, b)| [places[*a], places[*b]]);
+    // A corner in the plane counts as above it.
+    let through = sides.filter(|[a, b]| (a[1] < y_m) != (b[1] < y_m));
+    let at = |[a, b]: [[f64; 3]; 2]| {
+        let share = (y_m - a[1]) / (b[1] - a[1]);
+        [a[0] + share * (b[0] - a[0]), a[2] + share * (b[2] - a[2])]
+    };
+    through.map(at).collect()
 }
 
 /// The corners of the smallest convex outline of points in a plane, anticlockwise (Andrew's chains).
@@ -202,6 +290,7 @@ fn coil_parts(design: &Design, coil: &Coil, axis_m: [f64; 2], number: usize) -> 
 mod tests {
     use super::*;
     use crate::design::Need;
+    use crate::scene::Scene;
     use std::path::Path;
 
     const TEXT: &str = "name = \"pair\"\n[coil]\ninner_diameter_mm = 14.0\nouter_diameter_mm = 22.0\n\
@@ -211,7 +300,8 @@ mod tests {
     fn drawn(iron: &str) -> Vec<Part> {
         let text = format!("{TEXT}[[iron]]\n{iron}");
         let (design, _) = Design::from_toml(&text, Path::new("d.toml"), Need::EVALUATE).unwrap();
-        let plot = drawing(&design).unwrap();
+        let scene = Scene::new(&design).unwrap();
+        let plot = scene.drawing();
         plot.parts
             .into_iter()
             .filter(|part| part.role == Role::Iron)

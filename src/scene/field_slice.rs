@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::Scene;
-use super::drawing::drawing;
 use super::steel::{Solved, clearance_of_m, solve};
 use super::working_point::{TotalField, WorkingPoint};
 use crate::RunError;
@@ -47,10 +46,13 @@ pub struct FieldSlice {
 /// # Errors
 /// Steel that cannot be solved; interruption.
 pub fn picture(design: &Design, progress: &dyn Progress) -> Result<Option<SlicesPlot>, RunError> {
-    let Some(array) = drawing(design) else {
+    if design.coil.is_none() {
+        return Ok(None);
+    }
+    let scene = Scene::with_tolerance(design, Some(TOLERANCE))?;
+    let Some(array) = scene.drawing() else {
         return Ok(None);
     };
-    let scene = Scene::with_tolerance(design, Some(TOLERANCE))?;
     let solved = solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
     let state = WorkingPoint::new(&scene, &solved, &scene.upper_a, f64::NEG_INFINITY)?;
     let y_m = array.section_y_m;

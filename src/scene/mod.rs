@@ -10,6 +10,7 @@ pub mod felt_force;
 pub mod field_slice;
 pub mod iron;
 pub mod maps;
+pub mod named_files;
 pub mod neighbours;
 pub mod passive;
 pub mod passive_iron;
@@ -43,9 +44,11 @@ use crate::heating::Heating;
 use crate::lambda::uncertainty::Turned;
 use crate::map::tabulate::PlacedCoil;
 use crate::numerics::vec3::{cross, dot};
+use crate::plot::array::ArrayPlot;
 use crate::progress::Progress;
 use crate::scene::core_material::SceneCore;
 use crate::scene::iron::SceneIron;
+use crate::scene::named_files::NamedContent;
 use crate::scene::passive_iron::HeldPulls;
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
@@ -110,6 +113,8 @@ pub(crate) fn magnet_rule(
 pub struct Scene<'a> {
     /// The design.
     pub design: &'a Design,
+    /// The files that it names.
+    pub files: Vec<NamedContent>,
     /// Its coil section.
     pub coil: Coil,
     /// The winding.
@@ -138,7 +143,7 @@ impl<'a> Scene<'a> {
     /// Makes a design ready, to the default accuracy of its physics.
     ///
     /// # Errors
-    /// A design without a coil; a B-H table that cannot be used.
+    /// A design without a coil; a B-H table or a mesh that cannot be used.
     pub fn new(design: &'a Design) -> Result<Self, RunError> {
         Self::with_tolerance(design, None)
     }
@@ -153,12 +158,13 @@ impl<'a> Scene<'a> {
         })?;
         let circuit = Circuit::of_air_coil(&coil, &design.wire);
         let winding = circuit::winding(&coil, &design.wire);
+        let files = named_files::read(design)?;
         let core = design
             .core
             .as_ref()
-            .map(|core| SceneCore::new(core, &winding))
+            .map(|core| SceneCore::new(core, &winding, &files))
             .transpose()?;
-        let iron = SceneIron::new(design, &winding, core.as_ref())?;
+        let iron = SceneIron::new(design, &winding, core.as_ref(), &files)?;
         let coils = design
             .array
             .positions_m
@@ -178,6 +184,7 @@ impl<'a> Scene<'a> {
         Ok(Self {
             design,
             coil,
+            files,
             winding,
             core,
             iron,
@@ -204,6 +211,12 @@ impl<'a> Scene<'a> {
             tolerances: Tolerances::new(self.design, self.core.as_ref(), rated_a, requested),
             ..self.clone()
         }
+    }
+
+    /// The array, drawn.
+    #[must_use]
+    pub fn drawing(&self) -> Option<ArrayPlot> {
+        drawing::drawing(self.design, self.iron.iter().flat_map(SceneIron::irons))
     }
 
     /// The rated current of one coil: the largest of the array's upper limits, A.

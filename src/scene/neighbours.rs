@@ -68,7 +68,7 @@ fn iron_summary(
     warnings: &mut Vec<String>,
 ) -> Option<IronSummary> {
     let iron = scene.iron.as_ref()?;
-    warnings.extend(iron.above_knee(scene, peaks, "all coils at their rated currents"));
+    warnings.extend(iron.warnings(scene, peaks, "all coils at their rated currents"));
     let alone = "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
                  has the coils among all steel";
     warnings.push(alone.to_owned());

@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::boxes::{Box3, BoxTree};
 use crate::file_mesh::Triangle;
+use fluxform_numerics::box_tree::{Box3, BoxTree};
 use fluxform_numerics::vec3::{cross, minus};
 
 /// Parts into which the search is cut, about.

@@ -2,7 +2,6 @@
 
 mod raw;
 mod read;
-mod unit;
 
 pub use read::{keys, keys_of};
 
@@ -15,8 +14,8 @@ use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
+pub use fluxform_base::length_unit::{parse_unit, unit_name, unit_names};
 pub use raw::{RawSurface, RawSurfaceError};
-pub use unit::{parse_unit, unit_name, unit_names};
 
 /// A validated shape document, or a raw surface with its flags.
 #[derive(Debug, Clone, PartialEq)]

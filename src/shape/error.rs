@@ -30,7 +30,7 @@ pub enum ShapeError {
     },
     /// The format carries no unit and none was given.
     #[error(
-        "{}: {format} files carry no unit; state it (`unit = \"mm\"` in the shape file, \
+        "{}: {format} files carry no unit; state it (`unit = \"mm\"` in the shape file or [[iron]], \
          `--unit mm` on the command line)",
         path.display()
     )]

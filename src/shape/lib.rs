@@ -34,6 +34,7 @@
 pub mod amf;
 pub mod bodies;
 pub mod certificate;
+pub mod closed_body;
 pub mod deviation;
 pub mod document;
 pub mod error;
@@ -66,7 +67,6 @@ pub mod three_mf;
 
 mod archive;
 mod assembly;
-mod boxes;
 mod crossings;
 mod edges;
 mod index;

@@ -21,7 +21,7 @@ use fluxform_base::progress::Progress;
 use fluxform_design::named_file::{self, NamedFileError};
 
 /// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
-const LARGEST_FILE: u64 = 8 << 30;
+pub const LARGEST_FILE: u64 = 8 << 30;
 
 /// A placed surface, m.
 #[derive(Debug, Clone, PartialEq)]
@@ -176,15 +176,11 @@ fn read_observed(
     observer: &mut dyn ByteObserver,
     progress: &dyn Progress,
 ) -> Result<(FileMesh, f64), ShapeError> {
-    let missing = |format: SurfaceFormat| ShapeError::UnitMissing {
-        path: path.into(),
-        format: format.name(),
-    };
     let by_name = SurfaceFormat::of(path);
     if let (Some(format), None) = (by_name, stated_m)
         && !format.carries_unit()
     {
-        return Err(missing(format));
+        return Err(unit_missing(path, format));
     }
     if let Some(unit_m) = stated_m
         && !(unit_m > 0.0 && unit_m.is_finite())
@@ -194,18 +190,32 @@ fn read_observed(
         )));
     }
     let (format, file) = read_mesh(path, bodies, observer, progress)?;
-    match (file.unit_m, stated_m) {
+    let unit_m = unit_of(path, format, file.unit_m, stated_m)?;
+    Ok((file, unit_m))
+}
+
+/// The unit of a file's coordinates, m: the file's own, or as stated.
+pub(super) fn unit_of(
+    path: &Path,
+    format: SurfaceFormat,
+    own_m: Option<f64>,
+    stated_m: Option<f64>,
+) -> Result<f64, ShapeError> {
+    match (own_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
             file: unit_name(own),
             stated: unit_name(stated),
         }),
-        (None, None) => Err(missing(format)),
-        (own, stated) => {
-            // The reader of a format that carries its unit gives it.
-            let unit_m = own.or(stated).unwrap_or(1.0);
-            Ok((file, unit_m))
-        }
+        (Some(unit_m), _) | (None, Some(unit_m)) => Ok(unit_m),
+        (None, None) => Err(unit_missing(path, format)),
+    }
+}
+
+fn unit_missing(path: &Path, format: SurfaceFormat) -> ShapeError {
+    ShapeError::UnitMissing {
+        path: path.into(),
+        format: format.name(),
     }
 }
 
@@ -231,7 +241,7 @@ pub(super) fn read_mesh(
         });
         return Ok((SurfaceFormat::Stl, file?));
     }
-    let bytes = read_file(path)?;
+    let bytes = read_file(path, LARGEST_FILE)?;
     observer.restart();
     observer.observe(&bytes);
     let format = by_name.or_else(|| SurfaceFormat::of_content(&bytes));
@@ -286,12 +296,13 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
     Ok(())
 }
 
-/// A regular file's bytes.
-pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
-    let what = |error: NamedFileError| match error {
+/// A regular file's bytes, at most `max_bytes`.
+pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>, ShapeError> {
+    let what = |error: NamedFileError| {
+        match error {
         NamedFileError::Unreadable(error) => match error.kind() {
             io::ErrorKind::NotFound => {
-                "no such file; check the path (in a shape file it counts from that file's folder)"
+                "no such file; check the path (in a design or a shape file it counts from that file's folder)"
                     .into()
             }
             io::ErrorKind::PermissionDenied => "it may not be read (permission denied)".into(),
@@ -302,19 +313,20 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
             "this is not a regular file (a device, a pipe or a socket)".into()
         }
         NamedFileError::TooLarge(_) => {
-            format!("the file is larger than {LARGEST_FILE} bytes; export it coarser")
+            format!("the file is larger than {max_bytes} bytes; export it coarser")
         }
         NamedFileError::NoLength => {
             "the file is empty (0 bytes): the export or the download failed".into()
         }
         NamedFileError::OtherLength => format!("expected a surface, {error}"),
+    }
     };
     let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
         what,
     };
     let mut zeros = Zeros::default();
-    let read = named_file::read_watched(path, LARGEST_FILE, &mut |piece| {
+    let read = named_file::read_watched(path, max_bytes, &mut |piece| {
         fluxform_base::progress::poll();
         zeros.see(piece)
     });

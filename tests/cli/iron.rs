@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use fluxform_testing::place::Place;
 use fluxform_testing::run::Ran;
+use fluxform_testing::surfaces::{binary, block};
 
 /// Two short coils, and what else there is.
 fn design(place: &Place, more: &str) {
@@ -17,6 +18,9 @@ fn design(place: &Place, more: &str) {
 const CORE: &str = "[core]\nbelow_mm = 4.0\n";
 const PLATE: &str =
     "[core]\nbelow_mm = 4.0\n[plate]\nthickness_mm = 4.0\nx_mm = 70.0\ny_mm = 40.0\n";
+
+const FLAT: &str = "name = \"flat\"\nprimitive = \"flat\"\nside_mm = 30\nheight_mm = 20\n[points]\n\
+                    x_mm = [-15, 15, 5]\ny_mm = [-15, 15, 5]\n";
 
 fn evaluated(place: &Place, more: &str) -> Value {
     design(place, more);
@@ -130,11 +134,7 @@ fn a_sheet_of_steel_shields_what_is_behind_it() {
 fn a_bundle_of_a_plate_verifies() {
     let place = Place::new();
     design(&place, PLATE);
-    place.write(
-        "flat.toml",
-        "name = \"flat\"\nprimitive = \"flat\"\nside_mm = 30\nheight_mm = 20\n[points]\n\
-         x_mm = [-15, 15, 5]\ny_mm = [-15, 15, 5]\n",
-    );
+    place.write("flat.toml", FLAT);
     let args = [
         "calibrate",
         "design.toml",
@@ -147,9 +147,6 @@ fn a_bundle_of_a_plate_verifies() {
     place.run(&args).ends(0);
     place.run(&["verify", "out/pair/flat"]).ends(0);
 }
-
-const FLAT: &str = "name = \"flat\"\nprimitive = \"flat\"\nside_mm = 30\nheight_mm = 20\n[points]\n\
-                    x_mm = [-15, 15, 5]\ny_mm = [-15, 15, 5]\n";
 
 /// A plate's pull on the magnet was refused.
 #[test]
@@ -311,6 +308,227 @@ fn a_search_chooses_the_plate_within_its_limits() {
     assert!(choices.iter().any(|choice| choice["plate"] == false));
 }
 
+const MESH: &str = "[[iron]]\nshape = \"mesh\"\nsurface = \"bar.stl\"\nunit = \"mm\"\ntranslate_mm = [0, 0, -40]\n";
+
+/// A bar about the origin as a binary STL file, mm.
+fn bar(sides_mm: [f64; 3]) -> Vec<u8> {
+    let triangles = block(
+        sides_mm.map(|side| -0.5 * side),
+        sides_mm.map(|side| 0.5 * side),
+    );
+    binary(
+        &triangles
+            .iter()
+            .map(|t| t.map(|corner| corner.map(|c| c as f32)))
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// The same body, named by a file or by its sides.
+#[test]
+fn a_mesh_counts_as_the_body_that_it_bounds() {
+    let place = Place::new();
+    place.write("bar.stl", &bar([50.0, 24.0, 6.0]));
+    let by_sides = "[[iron]]\nshape = \"box\"\nsize_mm = [50, 24, 6]\ncenter_mm = [0, 0, -40]\n";
+    let results = [MESH, by_sides].map(|body| evaluated(&place, &format!("{CORE}{body}")));
+    let [mesh, sides] = results.each_ref().map(inductance_h);
+    let alone = inductance_h(&evaluated(&place, CORE));
+    assert!(
+        (mesh / sides - 1.0).abs() < 1e-4 && mesh > 1.02 * alone,
+        "{mesh} {sides} {alone}"
+    );
+    let peaks = results.map(|r| r["array"]["iron"]["peak_field_t"].as_f64().unwrap());
+    assert!((peaks[0] / peaks[1] - 1.0).abs() < 0.05, "{peaks:?}");
+}
+
+/// Two bars end to end on a third, touching and overlapping, are as one body that is nowhere cut.
+#[test]
+fn boxes_that_touch_are_joined() {
+    let place = Place::new();
+    let body = |size: &str, at: &str| {
+        format!("[[iron]]\nshape = \"box\"\nsize_mm = {size}\ncenter_mm = {at}\n")
+    };
+    let whole = body("[50, 24, 6]", "[0, 0, -40]");
+    let parts = [
+        body("[20, 24, 6]", "[-15, 0, -40]"),
+        body("[35, 24, 6]", "[7.5, 0, -40]"),
+    ];
+    let [one, joined] = [whole, parts.concat()].map(|iron| {
+        let result = evaluated(&place, &format!("{CORE}{iron}"));
+        (
+            inductance_h(&result),
+            result["array"]["iron"]["peak_field_t"].as_f64().unwrap(),
+        )
+    });
+    assert!((one.0 / joined.0 - 1.0).abs() < 1e-4, "{one:?} {joined:?}");
+    assert!((one.1 / joined.1 - 1.0).abs() < 0.05, "{one:?} {joined:?}");
+    let other = "relative_permeability = 50\n";
+    refused(
+        &place,
+        &format!("{CORE}{}{}{other}", parts[0], parts[1]),
+        &["[[iron]] 1 and [[iron]] 0 overlap and are of different steels"],
+    );
+}
+
+#[test]
+fn a_bundle_keeps_the_mesh_and_verifies_from_its_copy() {
+    let place = Place::new();
+    let mesh = bar([50.0, 24.0, 6.0]);
+    place.write("bar.stl", &mesh);
+    design(&place, &format!("{CORE}{MESH}"));
+    place.write("flat.toml", FLAT);
+    let args = |out: &'static str| {
+        [
+            "calibrate",
+            "design.toml",
+            "flat.toml",
+            "--out",
+            out,
+            "--tolerance",
+            "0.03",
+            "--vtk",
+        ]
+    };
+    place.run(&args("out")).ends(0);
+    assert_eq!(place.read("out/pair/flat/iron_0.stl"), mesh);
+    let manifest: Value = serde_json::from_str(&place.text("out/pair/flat/manifest.json")).unwrap();
+    assert_eq!(manifest["inputs"][1]["path"], "bar.stl");
+    let coils = place.read("out/pair/flat/vtk/coils.vtp");
+    let head = String::from_utf8_lossy(&coils);
+    // Windings and cores as prisms of 48 sides, and the twelve facets.
+    assert!(head.contains("NumberOfPolys=\"496\""), "{}", &head[..400]);
+    place.run(&["verify", "out/pair/flat"]).ends(0);
+    // What was cached belongs to the bytes, not to the name; another mesh is another bundle.
+    place.write("bar.stl", &bar([50.0, 24.0, 3.0]));
+    place
+        .run(&["verify", "out/pair/flat"])
+        .says(&["bar.stl has changed since the bundle was made"]);
+    place.run(&args("out")).says(&["--force"]);
+    let forced = [&args("out")[..], &["--force"]].concat();
+    place.run(&forced).ends(0);
+    place.run(&["verify", "out/pair/flat"]).ends(0);
+    assert_ne!(place.read("out/pair/flat/iron_0.stl"), mesh);
+    place.shell("rm bar.stl").ends(0);
+    place
+        .run(&["verify", "out/pair/flat"])
+        .ends(0)
+        .says(&["iron_0.stl of the bundle stands for it"]);
+}
+
+#[test]
+fn the_plan_of_a_sweep_records_the_mesh() {
+    let place = Place::new();
+    place.write("bar.stl", &bar([50.0, 24.0, 6.0]));
+    design(&place, &format!("{CORE}{MESH}"));
+    let plan = [
+        "sweep",
+        "plan",
+        "design.toml",
+        "--set",
+        "core.above_mm=1,2",
+        "--out",
+        "plan.json",
+    ];
+    place.run(&plan).ends(0);
+    let plan: Value = serde_json::from_str(&place.text("plan.json")).unwrap();
+    assert_eq!(plan["inputs"][1]["path"], "bar.stl", "{plan}");
+    place.write("bar.stl", &bar([50.0, 24.0, 3.0]));
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "points"])
+        .says(&["bar.stl: the file has changed since the plan was made"]);
+}
+
+#[test]
+fn a_mesh_that_cannot_be_is_refused_with_its_place() {
+    let place = Place::new();
+    let mesh = |more: &str| format!("{CORE}{MESH}{more}");
+    refused(
+        &place,
+        &mesh(""),
+        &["iron[0].surface", "bar.stl", "no such file"],
+    );
+    place.write("bar.stl", "");
+    refused(&place, &mesh(""), &["bar.stl", "empty"]);
+    place.write("bar.stl", &bar([50.0, 24.0, 6.0]));
+    refused(
+        &place,
+        &mesh("").replace("unit = \"mm\"\n", ""),
+        &["[[iron]] 0", "STL files carry no unit"],
+    );
+    refused(
+        &place,
+        &mesh("").replace("\"mm\"", "\"mn\""),
+        &["iron[0].unit", "expected mm, cm"],
+    );
+    refused(
+        &place,
+        &mesh("").replace("translate_mm", "center_mm"),
+        &["iron[0].center_mm", "no such key", "translate_mm"],
+    );
+    refused(
+        &place,
+        &mesh("").replace("-40]", "-35]"),
+        &[
+            "[[iron]] 0",
+            "from the core of coil",
+            "mm: closer steel is not resolved",
+        ],
+    );
+    refused(
+        &place,
+        &mesh("").replace("[0, 0, -40]", "[0, 0, -25]"),
+        &["[[iron]] 0 cuts the winding of coil 0", "mm; move it"],
+    );
+    let other = MESH.replace("-40]", "-46.01]");
+    refused(
+        &place,
+        &mesh(&other),
+        &["[[iron]] 1 and [[iron]] 0 are less than", "one united mesh"],
+    );
+    // Above the coils, where the finger's magnet is.
+    let roof = mesh("").replace("-40]", "20]");
+    design(&place, &roof);
+    place
+        .run(&["map", "design.toml", "--tolerance", "0.05"])
+        .ends(3)
+        .says(&["from the surface of [plate] or [[iron]]"]);
+    refused(
+        &place,
+        &format!("{roof}[target]\nheight_mm = 20\n"),
+        &["the magnet at the target", "above coil 0"],
+    );
+    let open = bar([50.0, 24.0, 6.0]);
+    let mut open = open[..open.len() - 50].to_vec();
+    open[80] -= 1;
+    place.write("bar.stl", &open);
+    refused(
+        &place,
+        &mesh(""),
+        &["bar.stl: the mesh is open: 3 edges", "mm; close it"],
+    );
+}
+
+#[test]
+fn a_mesh_is_drawn_with_its_array() {
+    let place = Place::new();
+    place.write("bar.stl", &bar([50.0, 24.0, 6.0]));
+    let drawn = |more: &str| {
+        design(&place, more);
+        let args = [
+            "evaluate",
+            "design.toml",
+            "--tolerance",
+            "0.05",
+            "--plot",
+            "array.svg",
+            "--force",
+        ];
+        place.run(&args).ends(0);
+        place.text("array.svg").matches("<path ").count()
+    };
+    assert_eq!(drawn(&format!("{CORE}{MESH}")), 2 + drawn(CORE));
+}
+
 fn refused(place: &Place, more: &str, words: &[&str]) -> Ran {
     design(place, more);
     place.run(&["evaluate", "design.toml"]).ends(3).says(words)
@@ -369,12 +587,12 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
     refused(
         &place,
         &body("size_mm = [5, 5, 5]\n"),
-        &["iron[0].shape", "box, cylinder, tube, ball"],
+        &["iron[0].shape", "box, cylinder, tube, ball, mesh"],
     );
     refused(
         &place,
         &body("shape = \"ball\"\nlength_mm = 3\n"),
-        &["no such size", "which is missing"],
+        &["no such key", "which is missing"],
     );
     design(&place, PLATE);
     place.write("points.csv", "x_m,y_m,z_m\n0.001,0.002,-0.036\n");

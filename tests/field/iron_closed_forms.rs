@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::components::Components;
 use fluxform_field::iron::array::{IronArray, RESOLUTIONS};
-use fluxform_field::iron::bodies::{Coils, Iron, Outline, Plate, cuboid, mesh, tube};
+use fluxform_field::iron::bodies::{Coils, Iron, Outline, Plate, cuboid, tube};
 use fluxform_field::iron::face::{Face, Point};
+use fluxform_field::iron::mesh_body::mesh;
 use fluxform_field::iron::uniform::InUniformField;
 use fluxform_field::winding::Winding;
 

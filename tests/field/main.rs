@@ -4,6 +4,7 @@ mod air_coil;
 mod bh_curve;
 mod core_field;
 mod iron;
+mod iron_bodies;
 mod iron_closed_forms;
 mod iron_passive;
 mod magnet;

@@ -1,6 +1,7 @@
 //! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
+mod closed_body;
 mod deviation;
 mod formats;
 mod fuzz;

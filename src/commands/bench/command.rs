@@ -16,11 +16,11 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error, number, number_to, percent, si};
 use crate::cli::start::{begin, folder};
 use crate::cli::values::{self, FileArgument};
-use crate::commands::calibrate::curve_table;
 use crate::commands::lambda::command::CriterionFlags;
 use crate::design::Need;
 use crate::scene::Scene;
 use crate::scene::cost::{Components, of_map};
+use crate::scene::named_files::NamedContent;
 
 /// Error against run time of a design and its objects
 ///
@@ -97,7 +97,7 @@ impl Bench {
             printer,
         )?;
         let mut inputs = vec![document.input.clone()];
-        inputs.extend(curve_table(&Scene::new(design)?).map(|(input, _)| input));
+        inputs.extend(Scene::new(design)?.files.iter().map(NamedContent::input));
         let request = BenchRequest {
             design,
             inputs,

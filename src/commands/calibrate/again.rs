@@ -3,10 +3,10 @@
 use super::BothSolved;
 use super::CalibrateOptions;
 use super::Calibration;
+use super::DESIGN_FILE;
 use super::Inductances;
 use super::LambdaReport;
 use crate::RunError;
-use crate::bundle::artefact::Input;
 use crate::bundle::cache::Store;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
@@ -27,6 +27,8 @@ pub struct Expected {
     pub lambda: LambdaFile,
     /// `points.csv`.
     pub points: Vec<PointRow>,
+    /// Names of the files that are copies of its inputs.
+    pub copies: Vec<String>,
     /// How its points count in the mean; `None`: all alike.
     pub weights: Option<Vec<f64>>,
 }
@@ -39,22 +41,19 @@ pub struct Expected {
 pub fn expected(
     scene: &Scene,
     source: DesignSource,
-    curve: Option<&(Input, String)>,
     shape: &ShapeSource,
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Expected, RunError> {
     let options = &options.for_shape(shape);
     let scene = &scene.to_tolerance(options.lambda.tolerance_for(scene.design));
-    let table = curve.map(|(_, text)| text.as_str());
-    let field = FieldStore::new(scene, table, Store::none());
+    let field = FieldStore::new(scene, Store::none());
     let solved = BothSolved::new(scene, &field, progress)?;
     let circuit = Inductances::new(scene, &solved.map, progress);
     let calibration = Calibration {
         scene,
         solved: &solved,
         source,
-        curve,
         circuit: &circuit,
         field: field.of_shape(&shape.document.name),
         shape,
@@ -65,8 +64,12 @@ pub fn expected(
     let seal = |content: &BundleContent, _: &LambdaReport| Ok(sealed_manifest(content)?);
     let (manifest, lambda) = calibration.compute(&object, progress, seal)?;
     let wanted = object.wanted(&calibration);
+    let named = scene.files.iter().map(|file| file.kept_name.clone());
     Ok(Expected {
         manifest,
+        copies: std::iter::once(DESIGN_FILE.to_owned())
+            .chain(named)
+            .collect(),
         weights: wanted.weights().map(<[f64]>::to_vec),
         points: wanted.rows(),
         lambda: lambda.file,

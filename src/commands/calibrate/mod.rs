@@ -36,6 +36,7 @@ use crate::progress::Progress;
 use crate::report::bundle_files;
 use crate::scene::Scene;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
+use crate::scene::named_files::NamedContent;
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
@@ -64,9 +65,6 @@ use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
-
-/// The name under which a bundle keeps the table of its design's magnetisation curve.
-pub const CURVE_FILE: &str = "bh_curve.csv";
 
 /// The stage of the map of the unpowered steel's pull among a bundle's accuracies.
 pub const PASSIVE_STAGE: &str = "passive_force_map";
@@ -243,10 +241,9 @@ pub fn run(
     check_reach(source.design, options)?;
     let tolerance = options.lambda.tolerance_for(source.design);
     let scene = Scene::with_tolerance(source.design, tolerance)?;
-    let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     let check = |shape: &ShapeSource| -> Result<Vec<Input>, RunError> {
-        let inputs = inputs(source, curve.as_ref(), shape);
+        let inputs = inputs(source, &scene, shape);
         let inputs = discretize::with_surface(&shape.document, inputs);
         let made_with = options.made_with(shape);
         let folder = folder_of(&scene, shape, options);
@@ -257,7 +254,7 @@ pub fn run(
     if !options.keep {
         store_of(&scene, options).clear();
     }
-    let field = field_store(&scene, curve.as_ref(), options);
+    let field = field_store(&scene, options);
     let solved = BothSolved::new(&scene, &field, progress)?;
     let circuit = Inductances::new(&scene, &solved.map, progress);
     let bundles = shapes
@@ -269,7 +266,6 @@ pub fn run(
                 scene: &scene,
                 solved: &solved,
                 source,
-                curve: curve.as_ref(),
                 circuit: &circuit,
                 field: field.of_shape(&shape.document.name),
                 shape,
@@ -318,32 +314,18 @@ fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
 }
 
 /// The field that earlier runs cached, unless the options are against that.
-pub(crate) fn field_store(
-    scene: &Scene,
-    curve: Option<&(Input, String)>,
-    options: &CalibrateOptions,
-) -> FieldStore {
+pub(crate) fn field_store(scene: &Scene, options: &CalibrateOptions) -> FieldStore {
     let store = if options.keep {
         store_of(scene, options)
     } else {
         Store::none()
     };
-    let table = curve.map(|(_, text)| text.as_str());
-    FieldStore::new(scene, table, store)
+    FieldStore::new(scene, store)
 }
 
 /// Beside the design's bundles.
 fn store_of(scene: &Scene, options: &CalibrateOptions) -> Store {
     Store::in_folder(options.out.join(&scene.design.name), STORE_FOLDER)
-}
-
-/// The table of the design's magnetisation curve as it was parsed: its entry among the inputs and
-/// its text.
-pub(crate) fn curve_table(scene: &Scene) -> Option<(Input, String)> {
-    let path = scene.design.curve_file()?;
-    let text = scene.core.as_ref()?.curve_text.clone()?;
-    let input = Input::of_bytes(path.display().to_string(), text.as_bytes());
-    Some((input, text))
 }
 
 /// Finest tolerance of inductances in air: they decide how currents lag, and nothing else.
@@ -396,16 +378,11 @@ fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> 
 }
 
 /// The inputs of a bundle, but for the surface that the shape's document names.
-fn inputs(
-    source: DesignSource,
-    curve: Option<&(Input, String)>,
-    shape: &ShapeSource,
-) -> Vec<Input> {
-    let curve = curve.map(|(input, _)| input);
-    let all = std::iter::once(source.input)
-        .chain(curve)
-        .chain(&shape.input);
-    all.cloned().collect()
+fn inputs(source: DesignSource, scene: &Scene, shape: &ShapeSource) -> Vec<Input> {
+    let mut all = vec![source.input.clone()];
+    all.extend(scene.files.iter().map(NamedContent::input));
+    all.extend(shape.input.clone());
+    all
 }
 
 /// An object's points.
@@ -432,7 +409,6 @@ struct Calibration<'a> {
     scene: &'a Scene<'a>,
     solved: &'a BothSolved,
     source: DesignSource<'a>,
-    curve: Option<&'a (Input, String)>,
     circuit: &'a Inductances,
     field: ShapeField<'a>,
     shape: &'a ShapeSource,
@@ -484,7 +460,7 @@ impl Calibration<'_> {
 
     /// The object's points and heights; their inputs are those of the whole bundle.
     fn points(&self, progress: &dyn Progress) -> Result<ObjectPoints, RunError> {
-        let inputs = inputs(self.source, self.curve, self.shape);
+        let inputs = inputs(self.source, self.scene, self.shape);
         let opened = OpenedSurface::new(&self.shape.document, inputs, progress)?;
         let search = self.search(&opened, progress)?;
         let document = search
@@ -557,7 +533,8 @@ impl Calibration<'_> {
         let mut map = arrays(&needed.made, runtime);
         map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
         let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
-        extra.extend((self.curve).map(|(_, text)| (CURVE_FILE, text.as_bytes())));
+        let files = self.scene.files.iter();
+        extra.extend(files.map(|file| (file.kept_name.as_str(), &file.bytes[..])));
         let vtk = self.vtk(grid_points, &lambda, &currents, progress)?;
         extra.extend(vtk.iter().map(|(name, bytes)| (*name, &bytes[..])));
         let mut content = BundleContent {

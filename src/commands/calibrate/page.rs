@@ -9,7 +9,6 @@ use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
 use crate::scene::Scene;
-use crate::scene::drawing::drawing;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// The page's input: what the bundle will hold, and what the scene adds. `tolerance` is that of the
@@ -30,7 +29,7 @@ pub(super) fn object<'a>(
         map: content.map,
         curves,
         directions,
-        array: drawing(scene.design),
+        array: scene.drawing(),
         section: CoilPlan {
             inner_radius_m: 0.5 * scene.coil.inner_diameter_m,
             outer_radius_m: 0.5 * scene.coil.outer_diameter_m,

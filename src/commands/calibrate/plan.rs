@@ -6,7 +6,6 @@
 use serde::Serialize;
 
 use super::CalibrateOptions;
-use super::curve_table;
 use super::field_store;
 use super::needed_coils;
 use super::needed_nodes;
@@ -113,8 +112,7 @@ pub fn plan(
 ) -> Result<Plan, RunError> {
     let tolerance = options.lambda.tolerance_for(source.design);
     let scene = Scene::with_tolerance(source.design, tolerance)?;
-    let curve = curve_table(&scene);
-    let field = field_store(&scene, curve.as_ref(), options);
+    let field = field_store(&scene, options);
     let cached = field.holds_steel();
     let whole = workspace_grid(source.design);
     let size = |grid: &crate::map::tabulate::Grid| [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];

@@ -185,17 +185,13 @@ fn coils(out: &mut Vec<u8>, scene: &Scene, currents: &[CurrentRow]) -> io::Resul
     write_poly(out, &poly, &[], &arrays)
 }
 
-/// The surface of a body, face by face.
+/// The surface of a body.
 fn faces(poly: &mut PolyData, body: &Body) {
     let first = poly.points_m.len();
-    poly.points_m.extend(body.places_m());
-    let side = Body::STEPS + 1;
-    for face in (first..poly.points_m.len()).step_by(side * side) {
-        let cells =
-            (0..Body::STEPS).flat_map(|v| (0..Body::STEPS).map(move |u| face + v * side + u));
-        for at in cells {
-            poly.push([at, at + 1, at + side + 1, at + side]);
-        }
+    let (places_m, polygons) = body.drawn();
+    poly.points_m.extend(places_m);
+    for polygon in polygons {
+        poly.push(polygon.into_iter().map(|at| first + at));
     }
 }
 

@@ -29,7 +29,7 @@ use crate::shape::document::{GridRequest, ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
-use crate::shape::surface::{ByteObserver, read_file};
+use crate::shape::surface::{ByteObserver, LARGEST_FILE, read_file};
 use crate::shape::{
     ConstraintPoints, Discretized, Settings, ShapeError, Surface, discretize_surface,
 };
@@ -604,7 +604,7 @@ fn shape_error(document: &ShapeDocument, source: ShapeError) -> RunError {
 pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
     if let SurfaceSource::File { path, .. } = &document.source {
         // A file that cannot be read is reported, with the reason, by the reader that comes next.
-        if let Ok(bytes) = read_file(path) {
+        if let Ok(bytes) = read_file(path, LARGEST_FILE) {
             let mut digest = ParsedBytes::default();
             digest.observe(&bytes);
             digest.add_to(&mut inputs, path);

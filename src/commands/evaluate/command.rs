@@ -20,7 +20,6 @@ use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
-use crate::scene::drawing::drawing;
 use crate::scene::field_slice;
 use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
 use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
@@ -89,7 +88,7 @@ impl Evaluate {
         }
         let json = printer.with_warnings(&result);
         let mut place = Stream::Output;
-        if let (Some(plot), Some(drawn)) = (&plot, drawing(design)) {
+        if let (Some(plot), Some(drawn)) = (&plot, &result.drawing) {
             place = plot.draw(&result.inputs, &drawn.drawing(), printer)?;
         }
         if let (Some(plot), Some(drawn)) = (&plot_field, field) {

@@ -14,6 +14,7 @@ use crate::coil::limits::LimitCheck;
 use crate::coil::transient::{LEFT, VoltageStep, core_energy_share};
 use crate::design::Design;
 use crate::heating::Heating;
+use crate::plot::array::ArrayPlot;
 use crate::scene::Scene;
 use crate::scene::neighbours::{self, ArraySummary};
 use crate::scene::rated::{CoilSummary, Rated};
@@ -58,6 +59,9 @@ pub struct Evaluation {
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,
+    /// The array to scale.
+    #[serde(skip)]
+    pub drawing: Option<ArrayPlot>,
 }
 
 /// After a voltage step, with eddy currents in the solid core.
@@ -107,6 +111,9 @@ pub fn evaluate(
     tolerance: Option<f64>,
 ) -> Result<Evaluation, RunError> {
     let scene = Scene::with_tolerance(design, tolerance)?;
+    if let Some(iron) = &scene.iron {
+        iron.check_target(design)?;
+    }
     let mut rated = Rated::new(&scene)?;
     let array = neighbours::array(&scene, &mut rated.accuracy, &mut rated.warnings)?;
     if let Some(array) = &array {
@@ -131,6 +138,7 @@ pub fn evaluate(
         accuracy_reached: rated.accuracy_missed.is_empty(),
         accuracy_missed: rated.accuracy_missed,
         warnings: rated.warnings,
+        drawing: scene.drawing(),
     })
 }
 

@@ -174,7 +174,7 @@ pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     );
     let name = &design.name;
     Ok(Documents {
-        array: drawing(&design),
+        array: drawing(&design, []),
         design: (
             format!("{name}.toml"),
             commented(&head, &of_designs(), &values),

@@ -529,7 +529,7 @@ impl PosedProblem<'_> {
     fn core_warnings(&self, solution: &Solution) -> Result<Vec<String>, RunError> {
         if let (Some(iron), Some(chosen)) = (&self.scene.iron, &solution.chosen) {
             let peaks = self.solved.iron_peaks(self.scene, &chosen.currents_a)?;
-            let above = |peaks| iron.above_knee(self.scene, &peaks, "the chosen currents");
+            let above = |peaks| iron.warnings(self.scene, &peaks, "the chosen currents");
             return Ok(peaks.map(above).unwrap_or_default());
         }
         let Some(core) = &self.scene.core else {

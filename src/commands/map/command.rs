@@ -193,7 +193,7 @@ impl Map {
             let mag_manip = &request.mag_manip;
             let beside = [&mag_manip.vector_field, &mag_manip.multipoles];
             let beside = beside.into_iter().flatten().cloned();
-            let read = document.also_read().map(Path::to_path_buf);
+            let read = document.also_read();
             Picture::new(file, request.force, beside.chain(read).chain(written))
         });
         if let Some(plot) = &plot {

@@ -200,11 +200,8 @@ pub fn run(
     let tolerance = request.tolerance.or(of_error.map(ErrorTarget::tolerance));
     let scene = Scene::with_tolerance(design, tolerance)?;
     let mag_manip = &request.mag_manip;
-    let protected: Vec<PathBuf> = design
-        .curve_file()
-        .map(Path::to_path_buf)
-        .into_iter()
-        .collect();
+    let files = scene.files.iter();
+    let protected: Vec<PathBuf> = files.map(|file| file.file.path.clone()).collect();
     // Refused before anything is computed.
     let made_with = request.made_with();
     let beside = [&mag_manip.vector_field, &mag_manip.multipoles];
@@ -380,6 +377,7 @@ impl Made {
     ) -> MapReport {
         let core = scene.core.as_ref();
         let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
+        warnings.extend(scene.iron.iter().flat_map(|iron| iron.put_right.clone()));
         warnings.extend(self.together.and_then(|together| together.warning));
         let requested = request
             .error

@@ -1,7 +1,7 @@
 //! `optimize`: the best coil within a design's limits.
 
 use super::text;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
@@ -122,7 +122,7 @@ impl Optimize {
         }
         let document = documents::design(&self.design, Need::OPTIMIZE, printer)?;
         let mark = mark(&self.design, &document.text);
-        let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
+        let protected: Vec<PathBuf> = document.also_read().collect();
         let inputs = vec![document.input.clone()];
         let overwrite =
             Overwrite::beginning(self.writing.force, &mark, &inputs).protecting(protected.iter());

@@ -49,7 +49,7 @@ pub(super) fn picture(around: &CoilLandscape, best: &BestCoil, design: &Design) 
         met: (0..around.forces_n.len()).map(met).collect(),
         limits: around.limits.iter().map(limit).collect(),
         best: Some((at, "best coil".to_owned())),
-        section: drawing(design).map(|array| Section {
+        section: drawing(design, []).map(|array| Section {
             title: "section of the array with it".to_owned(),
             outlines: array.sections_m(),
         }),

@@ -3,7 +3,7 @@
 use super::scan;
 use super::scan::units;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -131,7 +131,7 @@ impl Probe {
             ComponentsArgument::Gradient => Components::Gradient,
             ComponentsArgument::Gz => Components::Gz,
         };
-        let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
+        let protected: Vec<PathBuf> = document.also_read().collect();
         let inputs = vec![document.input, points_input];
         let out = self.out.as_ref().unwrap_or(&standard);
         let overwrite =

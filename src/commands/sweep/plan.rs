@@ -9,8 +9,10 @@ use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::sweep::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
 use crate::commands::discretize::with_surface;
+use crate::design::named_file::{NamedFile, Role};
 use crate::design::template::Template;
-use crate::design::{Design, InvalidDocument, Severity, Steel, source};
+use crate::design::{Design, InvalidDocument, Severity, source};
+use crate::scene::named_files::NamedContent;
 use crate::scene::sources::ShapeSource;
 use crate::shape::document::ShapeDocument;
 
@@ -69,7 +71,7 @@ impl PlanRequest {
 /// when it is computed.
 ///
 /// # Errors
-/// Values that the design's keys do not take; B-H tables that cannot be read.
+/// Values that the design's keys do not take; files that it names that cannot be read.
 pub fn plan(
     design: &Design,
     text: String,
@@ -79,8 +81,8 @@ pub fn plan(
     let path = PathBuf::from(&input.path);
     check_values(&text, &path, &request.axes)?;
     let mut inputs = vec![input];
-    for curve in curves(design, &path, &request.axes) {
-        inputs.push(curve_input(&curve)?);
+    for file in named_files(design, &path, &request.axes) {
+        inputs.push(NamedContent::read(file)?.input());
     }
     let plan = PlanFile::new(
         design.name.clone(),
@@ -121,26 +123,21 @@ pub(super) fn shape_inputs(shapes: &[ShapeSource]) -> Vec<Input> {
     shapes.iter().flat_map(of).collect()
 }
 
-/// A B-H table among the inputs.
-pub(super) fn curve_input(path: &Path) -> Result<Input, RunError> {
-    let text = source::table_text_of(path).map_err(|error| RunError::Input(error.to_string()))?;
-    Ok(Input::of_bytes(path.display().to_string(), text.as_bytes()))
-}
-
-/// The B-H tables that the variants name, in the order of the axis.
-fn curves(design: &Design, path: &Path, axes: &[Axis]) -> Vec<PathBuf> {
+/// The files that the variants name: of an axis those of all its values, in their order.
+fn named_files(design: &Design, path: &Path, axes: &[Axis]) -> Vec<NamedFile> {
     let beside = |file: &String| path.parent().unwrap_or(Path::new("")).join(file);
-    if let Some(axis) = axes.iter().find(|axis| axis.key == CURVE_KEY) {
-        let texts = axis.values.iter().filter_map(|value| match value {
-            Value::Text(file) => Some(beside(file)),
-            _ => None,
-        });
-        return texts.collect();
-    }
-    match design.core.as_ref().map(|core| &core.steel) {
-        Some(Steel::Curve(curve)) => vec![curve.clone()],
-        _ => Vec::new(),
-    }
+    let varied = axes.iter().find(|axis| axis.key == CURVE_KEY);
+    let curves = varied.into_iter().flat_map(|axis| &axis.values);
+    let curves = curves.filter_map(|value| match value {
+        Value::Text(file) => Some(NamedFile {
+            role: Role::Curve,
+            path: beside(file),
+        }),
+        _ => None,
+    });
+    let mut own = design.named_files();
+    own.retain(|file| varied.is_none() || file.role != Role::Curve);
+    curves.chain(own).collect()
 }
 
 fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> {

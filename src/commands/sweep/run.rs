@@ -1,19 +1,23 @@
 //! `sweep run`: computes the points that are missing.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::plan::{curve_input, shape_inputs, shapes};
+use super::plan::{shape_inputs, shapes};
 use super::point::Sweep;
 use crate::RunError;
 use crate::bundle::atomic::WriteError;
+use crate::bundle::read_bounded::digest_plain;
 use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
 use crate::progress::Progress;
 use crate::scene::sources::ShapeSource;
+
+/// The largest file that a plan names, bytes.
+const FILE_MAX_BYTES: u64 = 8 << 30;
 
 /// Which points of a plan are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,16 +163,20 @@ fn finished(
     }
 }
 
-/// Tables, shapes and surfaces are those that the plan was made with.
+/// Tables, meshes, shapes and surfaces are those that the plan was made with.
 fn check_inputs(plan: &PlanFile, shapes: &[ShapeSource]) -> Result<(), RunError> {
     let of_shapes = shape_inputs(shapes);
     for input in plan.inputs.iter().skip(1) {
         let known = of_shapes.iter().find(|now| now.path == input.path);
         let now = match known {
-            Some(now) => now.clone(),
-            None => curve_input(&PathBuf::from(&input.path))?,
+            Some(now) => now.sha256.clone(),
+            None => digest_plain(Path::new(&input.path), FILE_MAX_BYTES)
+                .map(|(_, sha256)| sha256)
+                .map_err(|error| {
+                    RunError::Input(format!("{}: cannot be read: {error}", input.path))
+                })?,
         };
-        if now.sha256 != input.sha256 {
+        if now != input.sha256 {
             return Err(RunError::Input(format!(
                 "{}: the file has changed since the plan was made; make the plan again with \
                  `fluxform sweep plan`",

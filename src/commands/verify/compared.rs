@@ -20,7 +20,6 @@ use crate::bundle::load::Bundle;
 use crate::bundle::seal::to_record;
 use crate::bundle::table::PointRow;
 use crate::commands::calibrate::again::Expected;
-use crate::commands::calibrate::{CURVE_FILE, DESIGN_FILE};
 
 /// Differences that are named.
 const NAMED: usize = 6;
@@ -242,7 +241,7 @@ fn kept_and_pages(
     }
     let mut pages = Vec::new();
     for file in stored {
-        let copy = [DESIGN_FILE, CURVE_FILE].contains(&file.path.as_str());
+        let copy = expected.copies.contains(&file.path);
         let page = file.path.ends_with(".html")
             || ["plots/", "vtk/"]
                 .iter()

@@ -1,28 +1,29 @@
 //! The inputs of a bundle: the documents that it names, read again.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::load::{Bundle, BundleError};
 use crate::bundle::manifest::SurfaceOptions;
 use crate::bundle::read_bounded::digest_plain;
-use crate::commands::calibrate::CURVE_FILE;
 use crate::commands::calibrate::CalibrateOptions;
 use crate::commands::calibrate::DESIGN_FILE;
 use crate::commands::calibrate::PAGE_FILE;
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::error_target::ErrorTarget;
-use crate::design::{Design, Need, Steel as Described, source};
+use crate::design::{Design, Need, source};
 use crate::force_direction::ForceOverride;
 use crate::lambda::Settings;
+use crate::scene::Scene;
 use crate::scene::sources::ShapeSource;
 use crate::shape::bodies::BodyOptions;
 use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource};
 use crate::units::FORCE_JND;
 
-/// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
+/// Inputs beside those that the bundle keeps, which are read again: it names them, and is not trusted with any
+/// number or size.
 const INPUTS_MAX: usize = 16;
 /// The largest of them.
 const INPUT_MAX_BYTES: u64 = 1 << 30;
@@ -33,12 +34,12 @@ const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;
 
 /// Design and shape of a bundle, and how they differ from what it says.
 pub(super) struct Sources {
-    /// Of the copy that the bundle keeps; a magnetisation curve is read from its copy too.
+    /// Of the copy that the bundle keeps; the files that it names are read from their copies too.
     pub(super) design: Design,
     /// Its text.
     pub(super) text: String,
-    /// The table of the design's magnetisation curve: its entry among the inputs and its text.
-    pub(super) curve: Option<(Input, String)>,
+    /// Where the files that it names were when the bundle was made.
+    pub(super) named: Vec<PathBuf>,
     /// `None` where its file is not here.
     pub(super) shape: Option<ShapeSource>,
     /// Contradictions: the bundle is not of these inputs.
@@ -61,19 +62,16 @@ impl Sources {
         let given = inputs.first().map_or(STANDARD, |input| &input.path);
         let (mut parsed, _) = Design::from_toml(&design, Path::new(given), Need::CALIBRATE)
             .map_err(|invalid| RunError::Input(invalid.to_string()))?;
-        let mut kept = vec![(DESIGN_FILE, design.as_str())];
-        let mut curve_text = None;
-        if let Some(core) = &mut parsed.core
-            && let Described::Curve(curve) = &mut core.steel
-        {
-            curve_text = Some(kept_text(bundle, CURVE_FILE)?);
-            *curve = bundle.folder.join(CURVE_FILE);
+        let mut kept = vec![(DESIGN_FILE.to_owned(), digest(design.as_bytes()))];
+        let named = parsed.named_files().into_iter();
+        let copies: Vec<String> = named.map(|file| file.kept_name()).collect();
+        for (name, (_, path)) in copies.into_iter().zip(parsed.named_files_mut()) {
+            kept.push((name.clone(), kept_digest(bundle, &name)?));
+            *path = bundle.folder.join(name);
         }
-        kept.extend(curve_text.iter().map(|text| (CURVE_FILE, text.as_str())));
-        for (place, (name, text)) in kept.iter().enumerate() {
-            let own = Input::of_bytes("", text.as_bytes()).sha256;
+        for (place, (name, own)) in kept.iter().enumerate() {
             match inputs.get(place) {
-                Some(input) if input.sha256 == own => {}
+                Some(input) if input.sha256 == *own => {}
                 Some(input) => faults.push(format!(
                     "inputs name {} with another digest than that of {name}",
                     input.path
@@ -81,14 +79,12 @@ impl Sources {
                 None => faults.push(format!("inputs do not name the file of {name}")),
             }
         }
-        if inputs.len() > INPUTS_MAX {
-            faults.push(format!(
-                "{} inputs, expected at most {INPUTS_MAX}",
-                inputs.len()
-            ));
+        let most = kept.len() + INPUTS_MAX;
+        if inputs.len() > most {
+            faults.push(format!("{} inputs, expected at most {most}", inputs.len()));
         }
         let mut missing = Vec::new();
-        for (place, input) in inputs.iter().take(INPUTS_MAX).enumerate() {
+        for (place, input) in inputs.iter().take(most).enumerate() {
             match state_of(input) {
                 InputState::Same => {}
                 InputState::Changed => faults.push(format!(
@@ -97,7 +93,7 @@ impl Sources {
                 )),
                 InputState::Missing if place < kept.len() => {
                     if input.path != STANDARD {
-                        let (name, path) = (kept[place].0, &input.path);
+                        let (name, path) = (&kept[place].0, &input.path);
                         notes.push(format!(
                             "{path} is not here; {name} of the bundle stands for it"
                         ));
@@ -110,16 +106,31 @@ impl Sources {
             Some(rest) if missing.is_empty() && faults.is_empty() => shape(bundle, rest)?,
             _ => None,
         };
-        let curve = inputs.get(1).cloned().zip(curve_text);
+        let named = inputs.iter().take(kept.len()).skip(1);
         Ok(Self {
             design: parsed,
-            curve,
+            named: named.map(|input| PathBuf::from(&input.path)).collect(),
             text: design,
             shape,
             faults,
             notes,
             missing,
         })
+    }
+
+    /// The scene of the design, its files named as the bundle's inputs name them.
+    ///
+    /// # Errors
+    /// A design that cannot be computed; a file that changed since its digest was checked.
+    pub(super) fn scene(&self, bundle: &Bundle) -> Result<Scene<'_>, RunError> {
+        let mut scene = Scene::new(&self.design)?;
+        for (content, path) in scene.files.iter_mut().zip(&self.named) {
+            if digest(&content.bytes) != kept_digest(bundle, &content.kept_name)? {
+                return Err(changed(bundle, &content.kept_name));
+            }
+            content.file.path.clone_from(path);
+        }
+        Ok(scene)
     }
 
     /// Why the shape cannot be read again, and what helps.
@@ -204,23 +215,40 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         .ok_or_else(|| "the options that the bundle names are none that a run may have".to_owned())
 }
 
-/// A text that the bundle keeps; its digest was checked with the others'.
+/// The design's text as the bundle keeps it; its digest was checked with the others'.
 fn kept_text(bundle: &Bundle, name: &str) -> Result<String, RunError> {
-    let path = bundle.folder.join(name);
-    if !bundle.manifest.files.iter().any(|file| file.path == name) {
+    let listed = kept_digest(bundle, name)?;
+    let text = source::text_of(&bundle.folder.join(name))
+        .map_err(|invalid| RunError::Input(invalid.to_string()))?;
+    if listed != digest(text.as_bytes()) {
+        return Err(changed(bundle, name));
+    }
+    Ok(text)
+}
+
+fn changed(bundle: &Bundle, name: &str) -> RunError {
+    let (path, message) = (bundle.folder.join(name), "changed while it was read");
+    BundleError::Content {
+        path,
+        message: message.to_owned(),
+    }
+    .into()
+}
+
+/// The digest of a file that the bundle keeps, as it is listed.
+fn kept_digest(bundle: &Bundle, name: &str) -> Result<String, RunError> {
+    let listed = bundle.manifest.files.iter().find(|file| file.path == name);
+    listed.map(|file| file.sha256.clone()).ok_or_else(|| {
         let message = "is not listed in manifest.json: there is nothing to verify against; \
                        calibrate again"
             .to_owned();
-        return Err(BundleError::Content { path, message }.into());
-    }
-    let text = source::text_of(&path).map_err(|invalid| RunError::Input(invalid.to_string()))?;
-    let listed = bundle.manifest.files.iter().find(|file| file.path == name);
-    let own = Input::of_bytes("", text.as_bytes()).sha256;
-    if listed.is_some_and(|file| file.sha256 != own) {
-        let message = "changed while it was read".to_owned();
-        return Err(BundleError::Content { path, message }.into());
-    }
-    Ok(text)
+        let path = bundle.folder.join(name);
+        BundleError::Content { path, message }.into()
+    })
+}
+
+fn digest(bytes: &[u8]) -> String {
+    Input::of_bytes("", bytes).sha256
 }
 
 enum InputState {

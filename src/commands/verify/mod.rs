@@ -191,7 +191,7 @@ impl Verifier {
         let bundle = Bundle::open(path)?;
         progress.advance(1);
         let sources = Sources::of(&bundle)?;
-        let scene = Scene::new(&sources.design)?;
+        let scene = sources.scene(&bundle)?;
         let mut all = Judgement {
             bundle,
             checks: Vec::new(),
@@ -290,8 +290,7 @@ impl Verifier {
                     input,
                 };
                 let quiet = Quiet(progress);
-                let curve = sources.curve.as_ref();
-                match expected(scene, source, curve, shape, &recipe.options, &quiet) {
+                match expected(scene, source, shape, &recipe.options, &quiet) {
                     Ok(computed) => Arc::new(computed),
                     Err(error @ RunError::Interrupted(_)) => return Err(error),
                     Err(error) => {

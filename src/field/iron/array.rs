@@ -27,6 +27,9 @@ pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
 ];
 /// Most entries of the dense matrices (1.6 GB).
 pub(super) const MOST_ENTRIES: usize = 200_000_000;
+/// A mesh of more facets does not fit, whatever its shape: two in one plane are one piece, of four nodes at the second
+/// resolution.
+pub const MOST_FACETS: usize = MOST_ENTRIES.isqrt() / 2;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
 /// Steps from the best node to the largest |B|.

@@ -1,8 +1,10 @@
 //! Bodies of steel as faces: cores, a plate that joins them, boxes, cylinders, tubes, meshes.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 use super::face::{Curve, Face, Point, Resolution};
+use super::mesh_body::MeshBody;
 use super::plate::{Cell, beyond, check_holes, is_apart};
 pub use super::plate::{Fault, Outline, Plate, Site};
 use crate::steel::CoreShape;
@@ -15,7 +17,7 @@ const UP: Point = [0.0, 0.0, 1.0];
 const DOWN: Point = [0.0, 0.0, -1.0];
 
 /// A body's shape about its middle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Solid {
     /// Sides along x, y and z, m.
     Box(Point),
@@ -23,10 +25,12 @@ pub enum Solid {
     Tube([f64; 3]),
     /// Radius, m.
     Ball(f64),
+    /// Flat facets.
+    Mesh(Arc<MeshBody>),
 }
 
 /// A body somewhere.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     /// Its shape.
     pub solid: Solid,
@@ -51,13 +55,14 @@ impl Body {
             let within = parts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             if within > 0.0 { beyond } else { within }
         };
-        match self.solid {
+        match &self.solid {
+            Solid::Mesh(mesh) => mesh.distance_m([x, y, z]),
             Solid::Box([a, b, c]) => {
                 outside(&[x.abs() - 0.5 * a, y.abs() - 0.5 * b, z.abs() - 0.5 * c])
             }
             Solid::Tube([inner, outer, length]) => {
                 let r = x.hypot(y);
-                let bore = if inner > 0.0 {
+                let bore = if *inner > 0.0 {
                     inner - r
                 } else {
                     f64::NEG_INFINITY
@@ -71,21 +76,52 @@ impl Body {
     /// Its surface.
     #[must_use]
     pub fn faces(&self) -> Vec<Face> {
-        let faces = match self.solid {
-            Solid::Box(sides) => cuboid(sides),
-            Solid::Tube([inner, outer, length]) => tube(inner, outer, length),
-            Solid::Ball(radius) => Face::ball([0.0; 3], [radius; 3]),
+        let faces = match &self.solid {
+            Solid::Box(sides) => cuboid(*sides),
+            Solid::Tube([inner, outer, length]) => tube(*inner, *outer, *length),
+            Solid::Ball(radius) => Face::ball([0.0; 3], [*radius; 3]),
+            Solid::Mesh(mesh) => mesh.faces(),
         };
         let turn = |p: Point| self.turn.map(|row| dot(row, p));
         let moved = |face: Face| face.moved(turn, self.centre_m);
         faces.into_iter().map(moved).collect()
     }
 
+    /// The least that any two of its opposite sides are apart, m.
+    #[must_use]
+    pub fn thickness_m(&self) -> f64 {
+        match &self.solid {
+            Solid::Box(sides) => sides.iter().copied().fold(f64::INFINITY, f64::min),
+            Solid::Tube([inner, outer, length]) => length.min(outer - inner),
+            Solid::Ball(radius) => 2.0 * radius,
+            Solid::Mesh(mesh) => mesh.thickness_m(),
+        }
+    }
+
+    /// Places on its surface, m, and the polygons between them, for drawings: of a mesh its facets.
+    #[must_use]
+    pub fn drawn(&self) -> (Vec<Point>, Vec<Vec<usize>>) {
+        if let Solid::Mesh(mesh) = &self.solid {
+            let facets = mesh.facets().iter();
+            let facets = facets.map(|facet| facet.iter().map(|k| *k as usize).collect());
+            return (mesh.vertices_m().to_vec(), facets.collect());
+        }
+        let (places, side) = (self.places_m().collect::<Vec<_>>(), Self::STEPS + 1);
+        let mut cells = Vec::new();
+        for face in (0..places.len()).step_by(side * side) {
+            for k in 0..Self::STEPS * Self::STEPS {
+                let at = face + k / Self::STEPS * side + k % Self::STEPS;
+                cells.push(vec![at, at + 1, at + side + 1, at + side]);
+            }
+        }
+        (places, cells)
+    }
+
     /// Steps along either side of a face in [`Body::places_m`].
-    pub const STEPS: usize = 16;
+    const STEPS: usize = 16;
 
     /// Places spread over its surface, m: of every face a grid, row by row.
-    pub fn places_m(&self) -> impl Iterator<Item = Point> + use<> {
+    fn places_m(&self) -> impl Iterator<Item = Point> + use<> {
         const STEPS: usize = Body::STEPS;
         self.faces().into_iter().flat_map(|face| {
             (0..=STEPS * (STEPS + 2)).map(move |k| {
@@ -190,7 +226,7 @@ impl Iron {
 
     /// No steel yet, and no coils.
     #[must_use]
-    pub(super) fn none() -> Self {
+    pub fn none() -> Self {
         Self {
             faces: Vec::new(),
             centres_m: Vec::new(),
@@ -203,7 +239,15 @@ impl Iron {
 
     /// Adds a body of its own.
     #[must_use]
-    pub fn with(mut self, body: Vec<Face>, chi: f64) -> Self {
+    pub fn with(self, body: Vec<Face>, chi: f64) -> Self {
+        let body = body.into_iter().map(|face| face.of_steel(chi));
+        self.with_joined(body.collect(), [false; 2])
+    }
+
+    /// Adds a body of several steels that hang together, whose faces have them; `mirrors`: the planes x = and y = that
+    /// none of its faces crosses, and whose mirror leaves all bodies that are added as they are.
+    #[must_use]
+    pub fn with_joined(mut self, body: Vec<Face>, mirrors: [bool; 2]) -> Self {
         let number = self.centres_m.len();
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for face in &body {
@@ -221,10 +265,10 @@ impl Iron {
         self.top_m = self.top_m.max(high[2]);
         self.centres_m
             .push([0, 1].map(|i| 0.5 * (low[i] + high[i])));
-        // Whether it is its own image is not looked at.
-        self.mirrors = [false; 2];
+        for (own, kept) in self.mirrors.iter_mut().zip(mirrors) {
+            *own &= kept;
+        }
         self.faces.extend(body.into_iter().map(|mut face| {
-            face.chi = [chi, 0.0];
             face.body = number;
             face
         }));
@@ -510,41 +554,6 @@ pub fn tube(inner_m: f64, outer_m: f64, length_m: f64) -> Vec<Face> {
             }));
         } else {
             faces.extend(disc([0.0; 2], outer_m, z, normal, true));
-        }
-    }
-    faces
-}
-
-/// A closed mesh's triangles, corners in m, each as three quadrangles; edges at which it bends are graded to.
-#[must_use]
-pub fn mesh(
-    triangles: &[[Point; 3]],
-    outward: f64,
-    is_sharp: impl Fn(usize, usize) -> bool,
-) -> Vec<Face> {
-    let mut faces = Vec::new();
-    for (number, corners) in triangles.iter().enumerate() {
-        let half = |a: Point, b: Point| std::array::from_fn(|i| 0.5 * (a[i] + b[i]));
-        let [a, b, c] = *corners;
-        let centre = std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0);
-        let normal = fluxform_numerics::vec3::cross(minus(b, a), minus(c, a)).map(|n| outward * n);
-        for k in 0..3 {
-            let (at, next, before) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-            let mut face = Face::ruled(
-                Curve::segment(at, half(at, next)),
-                Curve::segment(half(at, before), centre),
-                [
-                    is_sharp(number, (k + 2) % 3),
-                    false,
-                    is_sharp(number, k),
-                    false,
-                ],
-                centre,
-            );
-            if dot(face.point(0.5, 0.5).1, normal) < 0.0 {
-                face = face.turned();
-            }
-            faces.push(face);
         }
     }
     faces

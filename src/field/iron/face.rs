@@ -117,6 +117,8 @@ pub struct Face {
     pub(super) body: usize,
     /// The coil in whose bore it lies.
     pub(super) bore: Option<usize>,
+    /// Whether it is one of many pieces of something smooth, of which small ones need fewer nodes.
+    facet: bool,
 }
 
 impl Face {
@@ -158,6 +160,7 @@ impl Face {
             chi: [0.0; 2],
             body: 0,
             bore: None,
+            facet: false,
         }
     }
 
@@ -168,6 +171,31 @@ impl Face {
             self.cuts.push(v);
         }
         self
+    }
+
+    /// With steel of this relative permeability less one behind it, and nothing before it.
+    #[must_use]
+    pub fn of_steel(mut self, chi: f64) -> Self {
+        self.chi = [chi, 0.0];
+        self
+    }
+
+    /// A piece of something that may be smooth.
+    #[must_use]
+    pub(super) fn facet(mut self) -> Self {
+        self.facet = true;
+        self
+    }
+
+    /// Nodes along a side of its panels.
+    fn order(&self, resolution: &Resolution) -> usize {
+        let ([u, v], _) = self.extent();
+        if !self.facet || self.edges.contains(&true) || u.max(v) > resolution.panel_m {
+            return resolution.order;
+        }
+        // Every one of the resolutions has more than the one before, by which its error is estimated.
+        let least = (resolution.order + resolution.levels as usize).saturating_sub(3);
+        least.clamp(1, resolution.order)
     }
 
     /// Its normal reversed: the surface of a cavity.
@@ -276,10 +304,11 @@ impl Face {
             vs.extend(part[1..].iter().map(|t| from + (to - from) * t));
             from = to;
         }
+        let order = self.order(resolution);
         let mut panels = Vec::new();
         for u in us.windows(2) {
             for v in vs.windows(2) {
-                panels.push(Panel::new(self, number, [u[0], u[1], v[0], v[1]]));
+                panels.push(Panel::new(self, number, [u[0], u[1], v[0], v[1]], order));
             }
         }
         panels
@@ -369,6 +398,8 @@ pub struct Panel {
     pub(super) face: usize,
     /// From and to along u, from and to along v.
     pub(super) range: [f64; 4],
+    /// Nodes along each side.
+    pub(super) order: usize,
     /// A ball about it, m.
     pub(super) centre_m: Point,
     pub(super) radius_m: f64,
@@ -379,7 +410,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    pub(super) fn new(face: &Face, number: usize, range: [f64; 4]) -> Self {
+    pub(super) fn new(face: &Face, number: usize, range: [f64; 4], order: usize) -> Self {
         let [u0, u1, v0, v1] = range;
         let (um, vm) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
         let at = |u, v| face.point(u, v).0;
@@ -399,6 +430,7 @@ impl Panel {
         Self {
             face: number,
             range,
+            order,
             centre_m,
             radius_m,
             sides_m: [
@@ -419,7 +451,7 @@ impl Panel {
             let vm = 0.5 * (v0 + v1);
             [[u0, u1, v0, vm], [u0, u1, vm, v1]]
         };
-        cut.map(|range| Self::new(face, self.face, range))
+        cut.map(|range| Self::new(face, self.face, range, self.order))
     }
 
     /// The nodes of a rule with `orders` nodes along u and v.

@@ -13,7 +13,10 @@
 
 pub mod array;
 pub mod bodies;
+pub mod box_union;
+pub mod clearance;
 pub mod face;
+pub mod mesh_body;
 pub mod passive;
 pub mod plate;
 pub mod potential;

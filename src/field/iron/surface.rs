@@ -31,30 +31,36 @@ const MOST_DIPOLES: usize = 24;
 pub struct Surface {
     pub(super) faces: Vec<Face>,
     panels: Vec<Panel>,
-    /// Nodes along a panel's side.
-    order: usize,
+    /// The first node of every panel.
+    firsts: Vec<usize>,
+    /// The panel of every node.
+    panel_of: Vec<u32>,
     /// Panel by panel.
     pub(super) nodes: Vec<Node>,
-    basis: Basis,
+    /// By the number of nodes along a panel's side, less one.
+    bases: Vec<Basis>,
 }
 
 impl Surface {
     /// `faces` cut as `resolution` asks for.
     #[must_use]
     pub fn new(faces: Vec<Face>, resolution: &Resolution) -> Self {
-        let order = resolution.order;
         let panels: Vec<Panel> = (faces.iter().enumerate())
             .flat_map(|(number, face)| face.panels(number, resolution))
             .collect();
-        let nodes = panels
-            .iter()
-            .flat_map(|panel| panel.nodes(&faces[panel.face], [order; 2]))
-            .collect();
+        let (mut nodes, mut firsts, mut panel_of) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, panel) in panels.iter().enumerate() {
+            firsts.push(nodes.len());
+            nodes.extend(panel.nodes(&faces[panel.face], [panel.order; 2]));
+            panel_of.resize(nodes.len(), number as u32);
+        }
+        let bases = (1..=resolution.order).map(|order| Basis::new(gauss::rule(order)));
         Self {
-            basis: Basis::new(gauss::rule(order)),
+            bases: bases.collect(),
             faces,
             panels,
-            order,
+            firsts,
+            panel_of,
             nodes,
         }
     }
@@ -68,33 +74,28 @@ impl Surface {
     /// The face of a node.
     #[must_use]
     pub fn face_of(&self, node: usize) -> &Face {
-        &self.faces[self.panels[node / (self.order * self.order)].face]
+        &self.faces[self.panels[self.panel_of[node] as usize].face]
     }
 
     /// A node's place in its face's parameters, and the distance of its neighbours in them.
     pub(super) fn parameters(&self, node: usize) -> [[f64; 2]; 2] {
-        let own = self.order * self.order;
-        let [u0, u1, v0, v1] = self.panels[node / own].range;
-        let nodes = &gauss::rule(self.order).nodes;
+        let number = self.panel_of[node] as usize;
+        let Panel { order, range, .. } = self.panels[number];
+        let [u0, u1, v0, v1] = range;
+        let nodes = &gauss::rule(order).nodes;
         let at = |from: f64, to: f64, k: usize| from + 0.5 * (to - from) * (1.0 + nodes[k]);
-        let within = node % own;
-        let place = [
-            at(u0, u1, within / self.order),
-            at(v0, v1, within % self.order),
-        ];
-        [
-            place,
-            [u1 - u0, v1 - v0].map(|side| side / self.order as f64),
-        ]
+        let within = node - self.firsts[number];
+        let place = [at(u0, u1, within / order), at(v0, v1, within % order)];
+        [place, [u1 - u0, v1 - v0].map(|side| side / order as f64)]
     }
 
     /// Adds to `row` what the layer of every node gives at `target_m`:
     /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
     pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
-        let own = self.order * self.order;
         let mut scratch = [Vec::new(), Vec::new()];
-        for (index, panel) in self.panels.iter().enumerate() {
-            let row = &mut row[index * own..(index + 1) * own];
+        for (panel, first) in self.panels.iter().zip(&self.firsts) {
+            let nodes = *first..first + panel.order * panel.order;
+            let row = &mut row[nodes.clone()];
             let away = minus(target_m, panel.centre_m);
             let distance = norm(away);
             if let Some(normal) = panel.plane
@@ -104,7 +105,7 @@ impl Surface {
             }
             let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
             if distance - panel.radius_m > FAR * half {
-                for (value, node) in row.iter_mut().zip(&self.nodes[index * own..]) {
+                for (value, node) in row.iter_mut().zip(&self.nodes[nodes]) {
                     *value += kernel(target_m, node);
                 }
             } else {
@@ -141,7 +142,7 @@ impl Surface {
 
     /// The panel's basis at the nodes of a rule with `order` nodes along each side of a part of it.
     fn basis_on(&self, whole: &Panel, part: &Panel, order: usize, out: &mut [Vec<f64>; 2]) {
-        let count = self.order;
+        let (count, basis) = (whole.order, &self.bases[whole.order - 1]);
         for (side, out) in out.iter_mut().enumerate() {
             let (lo, hi) = (whole.range[2 * side], whole.range[2 * side + 1]);
             let (from, to) = (part.range[2 * side], part.range[2 * side + 1]);
@@ -152,8 +153,7 @@ impl Surface {
                 .zip(out.chunks_exact_mut(count))
             {
                 let at = from + 0.5 * (to - from) * (1.0 + x);
-                self.basis
-                    .weights(2.0 * (at - lo) / (hi - lo) - 1.0, weights);
+                basis.weights(2.0 * (at - lo) / (hi - lo) - 1.0, weights);
             }
         }
     }
@@ -165,7 +165,7 @@ impl Surface {
         row: &mut [f64],
         scratch: &mut [Vec<f64>; 2],
     ) {
-        let (order, count) = (self.order + MORE_NODES, self.order);
+        let (order, count) = (whole.order + MORE_NODES, whole.order);
         let face = &self.faces[whole.face];
         self.parts(target_m, whole, 0, &mut |part| {
             self.basis_on(whole, part, order, scratch);
@@ -213,14 +213,14 @@ impl Surface {
     /// Visits nodes with the layer `values` there, close enough to integrate what they give at a place off
     /// the surface.
     fn elements(&self, target_m: Point, values: &[f64], mut visit: impl FnMut(&Node, f64)) {
-        let own = self.order * self.order;
-        let (order, count) = (self.order + MORE_NODES, self.order);
         let mut scratch = [Vec::new(), Vec::new()];
-        for (index, panel) in self.panels.iter().enumerate() {
-            let values = &values[index * own..(index + 1) * own];
+        for (panel, first) in self.panels.iter().zip(&self.firsts) {
+            let (order, count) = (panel.order + MORE_NODES, panel.order);
+            let own = *first..first + count * count;
+            let values = &values[own.clone()];
             let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
             if distance > FAR * 0.5 * panel.sides_m[0].max(panel.sides_m[1]) {
-                for (value, node) in values.iter().zip(&self.nodes[index * own..]) {
+                for (value, node) in values.iter().zip(&self.nodes[own]) {
                     visit(node, *value);
                 }
                 continue;
@@ -257,7 +257,7 @@ impl Surface {
         let parts: Vec<_> = (0..self.faces.len())
             .into_par_iter()
             .map(|number| {
-                let whole = Panel::new(&self.faces[number], number, [0.0, 1.0, 0.0, 1.0]);
+                let whole = Panel::new(&self.faces[number], number, [0.0, 1.0, 0.0, 1.0], 1);
                 let panels = starts[number]..starts[number + 1];
                 let mut out = (Vec::new(), Vec::new());
                 self.add_dipoles(
@@ -329,8 +329,6 @@ impl Surface {
         let [first, second] = orders.map(|order| Basis::new(gauss::rule(order)));
         let mut moments = vec![0.0; orders[0] * orders[1] * drives];
         let (mut wu, mut wv) = (vec![0.0; orders[0]], vec![0.0; orders[1]]);
-        let own = self.order * self.order;
-        let (mut ou, mut ov) = (vec![0.0; self.order], vec![0.0; self.order]);
         let mut layer = vec![0.0; drives];
         for index in panels {
             let panel = &self.panels[index];
@@ -340,7 +338,10 @@ impl Surface {
             if shared[1] <= shared[0] || shared[3] <= shared[2] {
                 continue;
             }
-            let fine = orders.map(|order| self.order + order.div_ceil(2));
+            let (first_node, count) = (self.firsts[index], panel.order);
+            let basis = &self.bases[count - 1];
+            let (mut ou, mut ov) = (vec![0.0; count], vec![0.0; count]);
+            let fine = orders.map(|order| count + order.div_ceil(2));
             let rules = fine.map(gauss::rule);
             let common = Panel {
                 range: shared,
@@ -356,12 +357,12 @@ impl Surface {
                     let (lo, hi) = (range[2 * side], range[2 * side + 1]);
                     2.0 * (at(side) - lo) / (hi - lo) - 1.0
                 };
-                self.basis.weights(within(panel.range, 0), &mut ou);
-                self.basis.weights(within(panel.range, 1), &mut ov);
+                basis.weights(within(panel.range, 0), &mut ou);
+                basis.weights(within(panel.range, 1), &mut ov);
                 layer.fill(0.0);
                 for (a, wa) in ou.iter().enumerate() {
                     for (b, wb) in ov.iter().enumerate() {
-                        let from = (index * own + a * self.order + b) * drives;
+                        let from = (first_node + a * count + b) * drives;
                         for (sum, value) in layer.iter_mut().zip(&values[from..from + drives]) {
                             *sum += wa * wb * value;
                         }

@@ -31,6 +31,12 @@ impl InUniformField {
         for (faces, chi) in bodies {
             iron = iron.with(faces.clone(), *chi);
         }
+        Self::of(iron, direction, tier)
+    }
+
+    /// The same of `iron`, which is not mirrored.
+    #[must_use]
+    pub fn of(iron: Iron, direction: Point, tier: usize) -> Self {
         let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
         let system = System::new(&iron, &surface, &[[1.0, 1.0]]);
         let potential = surface

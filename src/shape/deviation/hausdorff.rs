@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::nearest::Tree;
 use super::piece::{Face, Patch, Point, Polygon, Rect};
 use super::visible::supremum_over_visible;
 use super::{DEEPEST, Extreme, Faces, Lattice, Leaf, Vertical, Worst};
 use crate::file_mesh::Triangle;
 use crate::mesh::Mesh;
 use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::nearest_triangle::Tree;
 
 /// Relative width at which a search ends.
 const NARROW: f64 = 0.01;

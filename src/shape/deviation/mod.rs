@@ -6,7 +6,6 @@
 //! Cells of which a corner has no surface are counted apart: there a runtime's force ends.
 
 mod hausdorff;
-mod nearest;
 pub(super) mod piece;
 mod primitive;
 mod sheets;

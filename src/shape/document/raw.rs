@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::unit::unit_names;
+use super::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
 use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
-use super::unit::{parse_unit, unit_names};
+use super::unit_names;
 use super::{
     AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
 };
@@ -14,7 +14,7 @@ use fluxform_base::point_weights::Weights;
 use fluxform_base::units::{DIRECTION_JND_DEG, m_from_mm};
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
-use fluxform_design::message_text::{nearest, quoted};
+use fluxform_design::message_text::quoted;
 use fluxform_design::reader::{Section, list_keys, read_document};
 use fluxform_design::rule::{Bound, Rule};
 use fluxform_design::source;
@@ -326,8 +326,7 @@ fn neither_or_both(root: &mut Section<'_>, both: bool) -> Option<SurfaceSource> 
 fn surface(root: &mut Section<'_>, path: &Path) -> Option<SurfaceSource> {
     root.ignore(&["primitive"]);
     let file = root.text("surface").map(|text| text.value);
-    let unit = root.text("unit");
-    let unit_m = unit.as_ref().and_then(|unit| unit_of(root, &unit.value));
+    let unit_m = root.length_unit("unit");
     let file = file?;
     let format = SurfaceFormat::of(Path::new(&file));
     // The content of a file without an ending states its format once it is read.
@@ -353,22 +352,6 @@ fn surface(root: &mut Section<'_>, path: &Path) -> Option<SurfaceSource> {
         path: path.parent().unwrap_or(Path::new("")).join(file),
         unit_m,
     })
-}
-
-fn unit_of(root: &Section<'_>, unit: &str) -> Option<f64> {
-    let metres = parse_unit(unit);
-    if metres.is_none() {
-        let names = unit_names();
-        let message = format!("expected {}, found {}", names.join(", "), quoted(unit));
-        let help = nearest(unit, &names).map(|near| format!("did you mean {near:?}?"));
-        root.fault(
-            "unit",
-            message,
-            help.as_deref()
-                .unwrap_or("name the unit of the file's coordinates"),
-        );
-    }
-    metres
 }
 
 fn primitive(root: &mut Section<'_>) -> Option<SurfaceSource> {

@@ -342,7 +342,7 @@ fn result(
         history: history(found),
         choices: found.choices.clone(),
         seed: request.settings.seed,
-        drawn: [document.design, &best].map(drawing),
+        drawn: [document.design, &best].map(|design| drawing(design, [])),
         design_text,
         warnings,
     })

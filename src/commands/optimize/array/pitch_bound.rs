@@ -96,7 +96,7 @@ pub fn pitch_bound(
     let Some(range_mm) = range_that_fits(problem) else {
         return Ok(None);
     };
-    let scene = Scene::with_tolerance(&design, physics.tolerance(Level::Full))?;
+    let scene = Scene::with_tolerance(&design, physics.tolerance(Level::Full, &design))?;
     let raised_m = problem.space.raised_m(&[range_mm[0]]);
     let positions_m = physics.positions_m(raised_m, Level::Full);
     let height_m: Vec<f64> = positions_m.iter().map(|p| p[2]).collect();
@@ -219,7 +219,7 @@ impl Bounding<'_> {
 
     fn node(&self, pitch_mm: f64) -> Result<Option<Node>, RunError> {
         let design = self.problem.space.design(&[pitch_mm]);
-        let scene = Scene::with_tolerance(&design, self.physics.tolerance(Level::Full))?;
+        let scene = Scene::with_tolerance(&design, self.physics.tolerance(Level::Full, &design))?;
         let solved = steel::solve(&scene, scene.tolerances.forces, self.lowest_m())?;
         let forces = scene.forces_n_per_a(&solved, self.positions_m, &Silent)?;
         let currents = self

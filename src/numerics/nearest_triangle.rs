@@ -1,25 +1,28 @@
 //! The distance from a point to a set of triangles: by a tree of boxes, nearest first.
 
-use crate::boxes::{Box3, BoxTree};
-use crate::file_mesh::Triangle;
-use fluxform_numerics::vec3::{dot, minus};
+use crate::box_tree::{Box3, BoxTree, Triangle};
+use crate::vec3::{dot, minus};
 
 /// A tree of boxes over triangles, and the triangles in its order.
-pub(super) struct Tree {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tree {
     boxes: BoxTree,
     triangles: Vec<Triangle>,
 }
 
 impl Tree {
-    pub(super) fn new(triangles: &[Triangle]) -> Self {
+    /// The tree of `triangles`.
+    #[must_use]
+    pub fn new(triangles: &[Triangle]) -> Self {
         let boxes = BoxTree::new(triangles);
         let order = boxes.order.iter();
         let triangles = order.map(|k| triangles[*k as usize]).collect();
         Self { boxes, triangles }
     }
 
-    /// Distance to the nearest triangle, and which it is; infinite without any.
-    pub(super) fn nearest(&self, p: [f64; 3]) -> (f64, usize) {
+    /// Distance to the nearest triangle, and which it is in the tree's order; infinite without any.
+    #[must_use]
+    pub fn nearest(&self, p: [f64; 3]) -> (f64, usize) {
         let mut best = (f64::INFINITY, 0);
         if !self.boxes.nodes.is_empty() {
             self.visit(0, p, &mut best);
@@ -31,7 +34,8 @@ impl Tree {
     ///
     /// The distance to a convex set is a convex function: no point of the corners' hull is farther
     /// from that triangle, hence none from all of them.
-    pub(super) fn farthest(&self, triangle: usize, corners: impl Iterator<Item = [f64; 3]>) -> f64 {
+    #[must_use]
+    pub fn farthest(&self, triangle: usize, corners: impl Iterator<Item = [f64; 3]>) -> f64 {
         let Some(triangle) = self.triangles.get(triangle) else {
             return f64::INFINITY;
         };
@@ -112,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_a_search_through_all_finds() {
-        let mut random = fluxform_numerics::random::Random::new(7);
+        let mut random = crate::random::Random::new(7);
         let mut next = || random.unit();
         let triangles: Vec<Triangle> = (0..300)
             .map(|_| {

@@ -1,30 +1,38 @@
 //! A tree of boxes over triangles: halved along the longest side, down to a few.
 
-use crate::file_mesh::Triangle;
-
 /// Triangles in a leaf.
 const LEAF: usize = 4;
 
+/// Three corners.
+pub type Triangle = [[f64; 3]; 3];
+
 /// Lower and upper corner.
-pub(super) type Box3 = [[f64; 3]; 2];
+pub type Box3 = [[f64; 3]; 2];
 
 /// Boxes in depth-first order; the left child follows its parent.
-pub(super) struct BoxTree {
-    pub(super) nodes: Vec<Node>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoxTree {
+    /// The first holds all triangles.
+    pub nodes: Vec<Node>,
     /// The triangles' indices in the order of the leaves.
-    pub(super) order: Vec<u32>,
+    pub order: Vec<u32>,
 }
 
-pub(super) struct Node {
-    pub(super) bounds: Box3,
+/// A box, of a leaf or with two children.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// The box.
+    pub bounds: Box3,
     /// Index of the right child, of an inner node.
-    pub(super) right: usize,
+    pub right: usize,
     /// Of a leaf its part of the order.
-    pub(super) range: Option<[usize; 2]>,
+    pub range: Option<[usize; 2]>,
 }
 
 impl BoxTree {
-    pub(super) fn new(triangles: &[Triangle]) -> Self {
+    /// The tree of `triangles`.
+    #[must_use]
+    pub fn new(triangles: &[Triangle]) -> Self {
         let mut tree = Self {
             nodes: Vec::new(),
             order: Vec::new(),
