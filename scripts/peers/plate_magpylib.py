@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The seed's nine cores on a plate by magpylib-material-response: cells of constant polarisation.
 
-    python3 scripts/peers/plate_magpylib.py EDGE_MM     # of the cells, about
+    python3 scripts/peers/plate_magpylib.py EDGE_MM [LAYERS]     # of the cells, about; of the plate, 1
 
 The centre coil is driven. Cores are cut by the package's `mesh_Cylinder` into near-cubic cells, the plate into cuboids,
 and solved by `apply_demag` as it comes (each cell's field at the others' centres); the winding is LOOPS current loops.
@@ -44,8 +44,8 @@ def winding():
     ]
 
 
-def steel(edge_m):
-    """Cells of nine cores and the plate, about as long as wide."""
+def steel(edge_m, layers):
+    """Cells of nine cores, about as long as wide, and layers of a plate."""
     bodies = []
     count = round(math.pi * INNER_M**2 * -BOTTOM_M / edge_m**3)
     for i in (-1, 0, 1):
@@ -59,14 +59,14 @@ def steel(edge_m):
         polarization=(0, 0, 1e-9), dimension=(SIDE_M, SIDE_M, THICKNESS_M),
         position=(0, 0, BOTTOM_M - THICKNESS_M / 2),
     )
-    across, layers = round(SIDE_M / edge_m), max(1, round(THICKNESS_M / edge_m))
+    across = round(SIDE_M / edge_m)
     bodies.append(mesh_Cuboid(plate, (across, across, layers)))
     return bodies
 
 
 def main():
     start = time.process_time()
-    coil, bodies = winding(), steel(1e-3 * float(sys.argv[1]))
+    coil, bodies = winding(), steel(1e-3 * float(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)
     solved = apply_demag(magpylib.Collection(*bodies, *coil), susceptibility=CHI)
     places = np.array([(i * PITCH_M, j * PITCH_M, 0.03) for i in (-1, 0, 1) for j in (-1, 0, 1)])
     up = places + (0, 0, STEP_M)
