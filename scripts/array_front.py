@@ -89,10 +89,10 @@ def drawn(seed):
         if layers >= 1 and outer >= RANGES["coil.outer_diameter_mm"][0] and outer <= pitch:
             break
     text = base()
-    for key, value in {"inner_diameter_mm": bore, "outer_diameter_mm": outer, "length_mm": turns * WIRE_MM,
-                       "turns": layers * turns, "pitch_mm": pitch, "rows": numbers.choice(ROWS)}.items():
-        lines = [f"{key} = {value}" if line.startswith(f"{key} = ") else line for line in text.splitlines()]
-        text = "\n".join(lines) + "\n"
+    for given, value in {"inner_diameter_mm = 24.0": bore, "outer_diameter_mm = 38.0": outer,
+                         "length_mm = 100.0": turns * WIRE_MM, "turns = 1429": layers * turns,
+                         "pitch_mm = 50.0": pitch, "rows = 3": numbers.choice(ROWS)}.items():
+        text = text.replace(f"\n{given}\n", f"\n{given.split()[0]} = {value}\n", 1)
     return text
 
 

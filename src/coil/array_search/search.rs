@@ -10,6 +10,7 @@ use fluxform_numerics::mixed_search::{MET, Search, Settings};
 
 use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room};
 use super::space::{Choice, Space, choices};
+use crate::limits::LimitName;
 
 /// What is searched, and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -201,7 +202,7 @@ fn problem<'a>(
         .map(|bound| format!("{} {}", label(bound), in_unit(bound, bound.value)))
         .collect();
     let given = problem.space.given(design);
-    let limits: Vec<String> = contradicting(problem, &given, request.settings)
+    let limits: Vec<String> = contradicting(problem, &given, &bounds, request.settings)
         .iter()
         .map(|bound| {
             let sign = if bound.at_least { ">=" } else { "<=" };
@@ -215,17 +216,40 @@ fn problem<'a>(
     })
 }
 
-/// Limits that cannot be met together, whereas they can without any one of them.
-fn contradicting(mut problem: ArrayProblem<'_>, given: &[f64], settings: Settings) -> Vec<Bounded> {
-    let bounds = problem.bounds(given, None);
-    for bound in &bounds {
+/// Limits that cannot be met together, whereas they can without any one of them; `nearest` are the limits of the
+/// design that breaks them least.
+fn contradicting(
+    mut problem: ArrayProblem<'_>,
+    given: &[f64],
+    nearest: &[Bounded],
+    settings: Settings,
+) -> Vec<Bounded> {
+    for bound in nearest {
         problem.leave_out(bound.key);
         let (_, judged) = Search::new(&problem, settings).least_broken(given);
         if judged.excess() <= MET {
             problem.take_in(bound.key);
         }
     }
-    problem.bounds(given, None)
+    let left: Vec<&'static str> = problem.bounds(given, None).iter().map(|b| b.key).collect();
+    // The ranges of layers and turns end at the coil's limits, whatever is left out.
+    let ends_range = |bound: &Bounded| {
+        let range = if bound.name == Some(LimitName::OuterDiameter) {
+            "search.coil.outer_diameter_mm"
+        } else if bound.name == Some(LimitName::Length) {
+            "search.coil.length_mm"
+        } else {
+            return false;
+        };
+        let low = nearest.iter().find(|b| b.key == range && b.at_least);
+        left.contains(&range) && low.is_some_and(|low| low.limit > bound.limit * 1e3)
+    };
+    let needed = nearest.iter().filter(|bound| {
+        // Of a range the end that is broken.
+        let broken = bound.excess() > 0.0 || !bound.key.starts_with("search.");
+        (left.contains(&bound.key) && broken) || ends_range(bound)
+    });
+    needed.copied().collect()
 }
 
 /// What the user wrote, or would write, for a limit.

@@ -188,5 +188,6 @@ fn limits_that_no_design_meets_are_named_before_anything_is_computed() {
         .err()
         .expect("a contradiction")
         .to_string();
-    assert!(refused.contains("outer_diameter"), "{refused}");
+    let named = "meets outer diameter <= 38 mm and search.coil.outer_diameter_mm >= 45 mm;";
+    assert!(refused.contains(named), "{refused}");
 }
