@@ -211,7 +211,6 @@ fn result(
         lambda_n_per_m: physical.lambda_n_per_m[index],
         gain: ratios[index],
     };
-    let axes = found.problem.space.axes().iter().map(|axis| axis.key());
     let search = &found.search;
     let objective = |x: &Vec<f64>| {
         let sample = search.samples().iter().find(|sample| sample.x == *x)?;
@@ -259,7 +258,7 @@ fn result(
         },
         gain: together(&ratios, request.shares.as_deref()),
         shapes: shapes.iter().enumerate().map(shape).collect(),
-        values: axes.zip(x.iter().copied()).collect(),
+        values: found.problem.space.named(x),
         limits,
         limits_given,
         limits_met,

@@ -160,6 +160,7 @@ fn trade_offs(result: &ArrayOptimization) -> Option<Section> {
             lies.into(),
             format!("{magnet} mm").into(),
             if choice.core { "yes" } else { "no" }.into(),
+            if choice.plate { "yes" } else { "no" }.into(),
             gain.into(),
         ]
     };
@@ -171,6 +172,7 @@ fn trade_offs(result: &ArrayOptimization) -> Option<Section> {
                 ("layout", false),
                 ("magnet", false),
                 ("core", false),
+                ("plate", false),
                 ("gain", true),
             ],
             rows: result.choices.iter().map(row).collect(),
