@@ -113,8 +113,8 @@ fn steel(s: &mut Section<'_>) -> LinearSteel {
         s.fault(
             "bh_curve",
             "plates and bodies of [[iron]] are solved as linear steel, not along a curve",
-            "give relative_permeability, and the curve's knee as knee_t: results state the largest flux \
-             density, and are worth nothing where it passes the knee",
+            "give relative_permeability, and the curve's knee as knee_t: `evaluate` states the largest flux density beside \
+             the knee (array.iron) and its error (accuracy.iron_field); above the knee the answer is worth nothing",
         );
     }
     LinearSteel {

@@ -66,8 +66,9 @@ impl SceneIron {
         let refuse = |message: &str| Err(RunError::Input(message.to_owned()));
         if core.is_some_and(|core| matches!(core.material, Material::Curve(_))) {
             return refuse(
-                "[core] bh_curve: with [plate] or [[iron]] steel is solved as linear; give \
-                 relative_permeability and knee_t: results state the largest flux density",
+                "[core] bh_curve: with [plate] or [[iron]] steel is solved as linear; give relative_permeability and \
+                 knee_t: `evaluate` states the largest flux density of every core and of the plate beside its knee, \
+                 with its error (accuracy.iron_field); above the knee the answer is worth nothing",
             );
         }
         if core.is_some() && design.array.coupling == Coupling::None {

@@ -65,20 +65,27 @@ fn iron_summary(
     scene: &Scene,
     settling_s: f64,
     peaks: &IronPeaks,
-    warnings: &mut Vec<String>,
-) -> Option<IronSummary> {
-    let iron = scene.iron.as_ref()?;
+    (accuracy, warnings): (&mut BTreeMap<&'static str, StageAccuracy>, &mut Vec<String>),
+) -> Result<Option<IronSummary>, RunError> {
+    let Some(iron) = &scene.iron else {
+        return Ok(None);
+    };
+    accuracy.extend(iron_accuracy(peaks).map(|stage| ("iron_field", stage)));
     warnings.extend(iron.warnings(scene, peaks, "all coils at their rated currents"));
     let alone = "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
                  has the coils among all steel";
     warnings.push(alone.to_owned());
-    Some(IronSummary {
+    let passive_force_n = iron_pull(scene)?.map(|(force_n, stage)| {
+        accuracy.insert("iron_passive_force", stage);
+        force_n
+    });
+    Ok(Some(IronSummary {
         peak_field_t: peaks.elsewhere.field_t,
         peak_at_m: peaks.elsewhere.place_m,
         knee_t: iron.knee_t,
         settling_s,
-        passive_force_n: None,
-    })
+        passive_force_n,
+    }))
 }
 
 /// The pull of all unpowered steel over the coil nearest to the array's middle at the target's height, N, and how
@@ -187,23 +194,13 @@ pub(crate) fn array(
             "a core of the array with all coils at their rated currents",
         ));
     }
-    let iron = solved.iron_peaks(scene, &scene.upper_a)?;
-    let iron = iron.and_then(|peaks| {
-        peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
-        accuracy.extend(iron_accuracy(&peaks).map(|stage| ("iron_field", stage)));
-        iron_summary(scene, slowest.settling_s(), &peaks, warnings)
-    });
-    let pulled = iron.is_some().then(|| iron_pull(scene)).transpose()?;
-    let iron = iron.map(|iron| match pulled.flatten() {
-        Some((force_n, stage)) => {
-            accuracy.insert("iron_passive_force", stage);
-            IronSummary {
-                passive_force_n: Some(force_n),
-                ..iron
-            }
+    let iron = match solved.iron_peaks(scene, &scene.upper_a)? {
+        Some(peaks) => {
+            peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
+            iron_summary(scene, slowest.settling_s(), &peaks, (accuracy, warnings))?
         }
-        None => iron,
-    });
+        None => None,
+    };
     let coils = axes
         .iter()
         .enumerate()

@@ -156,7 +156,7 @@ fn the_pull_of_cores_on_a_plate_is_counted_and_verified() {
     let calibrated = |more: &str, out: &str| {
         design(&place, more);
         let args = ["calibrate", "design.toml", "flat.toml", "--out", out];
-        let options = ["--tolerance", "0.03", "--format", "json"];
+        let options = ["--tolerance", "0.1", "--format", "json"];
         place.run(&[&args[..], &options].concat()).ends(0).json();
         let read = |file: &str| -> Value {
             serde_json::from_str(&place.text(&format!("{out}/pair/flat/{file}"))).unwrap()
@@ -271,41 +271,47 @@ fn a_sweep_over_plates_has_what_evaluate_has() {
 fn a_search_chooses_the_plate_within_its_limits() {
     let place = Place::new();
     place.write("flat.toml", FLAT);
-    let search = |more: &str| {
-        let limit = "[limits]\narray_mass_max_kg = 0.275\n";
-        let varied = "[search.plate]\nthickness_mm = [1.0, 6.0]\nnone = true\n";
-        design(&place, &format!("{PLATE}{limit}{varied}{more}"));
-        let args = [
-            "optimize",
-            "design.toml",
-            "--for",
-            "flat.toml",
-            "--out",
-            "best.toml",
-        ];
-        let options = [
-            "--evaluations",
-            "10",
-            "--tolerance",
-            "0.1",
-            "--format",
-            "json",
-            "--force",
-        ];
-        place.run(&[&args[..], &options].concat()).ends(0).json()
-    };
-    let found = search("");
+    let text = "name = \"one\"\n[coil]\ninner_diameter_mm = 14.0\nouter_diameter_mm = 22.0\nlength_mm = 30.0\n\
+                [wire]\ndiameter_mm = 0.7\n[core]\nbelow_mm = 4.0\n[array]\npositions_mm = [[0, 0]]\n\
+                [workspace]\nx_mm = [-20, 20, 5]\ny_mm = [-20, 20, 5]\nz_mm = [12, 30, 4]\n\
+                [plate]\nthickness_mm = 4.0\ndiameter_mm = 40.0\n[limits]\narray_mass_max_kg = 0.13\n\
+                [search.plate]\nthickness_mm = [1.0, 6.0]\nnone = true\n";
+    place.write("design.toml", text);
+    let args = [
+        "optimize",
+        "design.toml",
+        "--for",
+        "flat.toml",
+        "--out",
+        "best.toml",
+    ];
+    let options = [
+        "--evaluations",
+        "10",
+        "--tolerance",
+        "0.1",
+        "--format",
+        "json",
+    ];
+    let found = place.run(&[&args[..], &options].concat()).ends(0).json();
     let thickness = found["values"]["plate.thickness_mm"].as_f64().unwrap();
-    assert!(place.text("best.toml").contains("[plate]"));
-    assert!(found["gain"].as_f64().unwrap() > 0.9, "{found}");
     let mass = found["limits"]["array_mass_kg"]["value"].as_f64().unwrap();
+    assert!(mass <= 0.13 && mass > 0.1299, "{mass}");
+    assert!(thickness > 1.0 && thickness < 6.0, "{thickness}");
     assert!(
-        mass <= 0.275 && thickness > 1.0 && thickness < 6.0,
-        "{mass} {thickness}"
+        place
+            .text("best.toml")
+            .contains(&format!("thickness_mm = {thickness}"))
     );
     let choices = found["choices"].as_array().unwrap();
-    assert_eq!(choices.len(), 2);
-    assert!(choices.iter().any(|choice| choice["plate"] == false));
+    let gain = |plate: bool| {
+        let choice = choices
+            .iter()
+            .find(|choice| choice["plate"] == plate)
+            .unwrap();
+        choice["objective"].as_f64().unwrap()
+    };
+    assert!(gain(true) > gain(false), "{choices:?}");
 }
 
 const MESH: &str = "[[iron]]\nshape = \"mesh\"\nsurface = \"bar.stl\"\nunit = \"mm\"\ntranslate_mm = [0, 0, -40]\n";

@@ -439,7 +439,7 @@ impl<'a> ArrayProblem<'a> {
     fn margin(&self, bound: &Bounded) -> f64 {
         match bound.name {
             // What is not wound is not rounded, and may be at its limit as given.
-            _ if !self.space.is_wound() => MET,
+            _ if !self.space.is_wound() && !self.space.varies_plate() => MET,
             // Whole wires meet it exactly.
             Some(LimitName::Length) => -ROUNDING,
             _ => MARGIN,

@@ -102,8 +102,7 @@ impl SearchedChoice {
         let space = &problem.space;
         let best = search.best();
         let values = best.as_ref().map_or_else(BTreeMap::new, |(sample, _)| {
-            let keys = space.axes().iter().map(|axis| axis.key());
-            keys.zip(space.made(&sample.x)).collect()
+            space.named(&space.made(&sample.x))
         });
         let met = best.filter(|(_, judged)| judged.excess() <= MET);
         let magnet = &space.base().magnet;

@@ -1,5 +1,7 @@
 //! The designs that a search goes through: from numbers to a design and to the keys of its file.
 
+use std::collections::BTreeMap;
+
 use fluxform_base::units::m_from_mm;
 use fluxform_design::array::grid_positions_m;
 use fluxform_design::search::{SearchKey, SearchLayout, SearchSpace, SearchValues};
@@ -369,6 +371,14 @@ impl Space {
                 self.push(Axis::Move(group), values);
             }
         }
+        // A search has a variable, if only that of the plate that is left out.
+        if let (true, true, None) = (self.axes.is_empty(), search.without_plate, &self.base.plate)
+            && let Some((key, values)) = plate::KEYS
+                .iter()
+                .find_map(|(key, _)| Some((*key, search.values(*key)?)))
+        {
+            self.push(Axis::Plate(key), values);
+        }
         Ok(())
     }
 
@@ -424,6 +434,19 @@ impl Space {
     #[must_use]
     pub fn axes(&self) -> &[Axis] {
         &self.axes
+    }
+
+    /// Its variables at `x` by key, but for those of a plate that is left out.
+    #[must_use]
+    pub fn named(&self, x: &[f64]) -> BTreeMap<String, f64> {
+        let there = |axis: &Axis| self.base.plate.is_some() || !matches!(axis, Axis::Plate(_));
+        let pairs = self.axes.iter().zip(x).filter(|(axis, _)| there(axis));
+        pairs.map(|(axis, x)| (axis.key(), *x)).collect()
+    }
+
+    /// Whether lengths of the plate vary.
+    pub(super) fn varies_plate(&self) -> bool {
+        self.axes.iter().any(|axis| matches!(axis, Axis::Plate(_)))
     }
 
     /// The given design with this choice's magnet and core.
@@ -509,15 +532,21 @@ impl Space {
     /// The same with lengths that are made rounded to micrometres.
     #[must_use]
     pub fn made(&self, x: &[f64]) -> Vec<f64> {
-        let rounded = |(x, variable): (&f64, &Variable)| match variable.values {
+        let rounded = |((x, variable), axis): ((&f64, &Variable), &Axis)| match variable.values {
             Values::Continuous => {
-                let near = (x / MADE_MM).round() * MADE_MM;
+                let step = match axis {
+                    // A plate's mass is to stay within its limit.
+                    Axis::Plate(_) => 0.01 * MADE_MM,
+                    _ => MADE_MM,
+                };
+                let near = (x / step).round() * step;
                 let near: f64 = format!("{near:.6}").parse().unwrap_or(near);
                 near.clamp(variable.low, variable.high)
             }
             Values::Whole | Values::Listed(_) => *x,
         };
-        x.iter().zip(&self.variables).map(rounded).collect()
+        let variables = x.iter().zip(&self.variables);
+        variables.zip(&self.axes).map(rounded).collect()
     }
 
     /// Bore, outer diameter, length and turns of the winding, mm; layers and turns may be fractions.

@@ -269,7 +269,6 @@ fn result(
             gain: ratios[index],
         }
     };
-    let axes = found.problem.space.axes().iter().map(|axis| axis.key());
     let search = &found.search;
     let objective = |x: &Vec<f64>| {
         let sample = search.samples().iter().find(|sample| sample.x == *x)?;
@@ -318,7 +317,7 @@ fn result(
         },
         gain,
         shapes: shapes.iter().enumerate().map(shape).collect(),
-        values: axes.zip(x.iter().copied()).collect(),
+        values: found.problem.space.named(x),
         limits,
         limits_given,
         limits_met,

@@ -162,6 +162,7 @@ fn trade_offs(result: &ArrayOptimization) -> Option<Section> {
             lies.into(),
             format!("{magnet} mm").into(),
             if choice.core { "yes" } else { "no" }.into(),
+            if choice.plate { "yes" } else { "no" }.into(),
             gain.into(),
         ]
     };
@@ -173,6 +174,7 @@ fn trade_offs(result: &ArrayOptimization) -> Option<Section> {
                 ("layout", false),
                 ("magnet", false),
                 ("core", false),
+                ("plate", false),
                 ("gain", true),
             ],
             rows: result.choices.iter().map(row).collect(),
