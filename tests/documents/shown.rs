@@ -8,13 +8,13 @@ use fluxform_testing::place::Place;
 use fluxform_testing::root;
 use fluxform_testing::run::program;
 
-use crate::pages::{command_and_output, page, section};
+use crate::pages::{blocks, command_and_output, page, section};
 use fluxform_testing::needs::{self, Trial};
 use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [the_first_command_prints_what_the_readme_shows, the_picture_is_what_its_command_draws, the_table_of_numbers_is_what_the_commands_print, one_command_of_a_section_prints_what_is_shown, the_errors_of_a_scene_are_those_shown, the_sweep_prints_what_is_shown, the_replay_prints_what_is_shown, every_command_has_a_row_and_every_row_is_a_command],
+        None => [the_first_command_prints_what_the_readme_shows, the_picture_is_what_its_command_draws, the_table_of_numbers_is_what_the_commands_print, one_command_of_a_section_prints_what_is_shown, the_errors_of_a_scene_are_those_shown, the_sweep_prints_what_is_shown, the_replay_prints_what_is_shown, the_tray_shields_as_shown, every_command_has_a_row_and_every_row_is_a_command],
         needs::python() => [the_table_of_force_constants_is_what_its_script_prints],
     }
 }
@@ -160,6 +160,57 @@ fn the_sweep_prints_what_is_shown() {
         .map(|command| printed(&arguments(command, &files, folder.path())))
         .collect();
     assert_eq!(lasting(&shown), lasting(&all));
+}
+
+/// |B| with and without the tray of the text, every coil at 1 A.
+fn the_tray_shields_as_shown() {
+    let text = section("A plate below the cores, and other steel");
+    let tray = blocks(&text)
+        .into_iter()
+        .find(|block| block.text.contains("a tray"));
+    let seed = std::fs::read_to_string(root().join("designs/seed.toml")).unwrap();
+    let place = Place::empty();
+    place.write("without.toml", &seed);
+    place.write("shielded.toml", &format!("{seed}\n{}", tray.unwrap().text));
+    let rows: Vec<Vec<f64>> = (text
+        .split("in the tray, mT |\n|---|---|---|\n")
+        .nth(1)
+        .unwrap()
+        .lines())
+    .take_while(|line| line.starts_with('|'))
+    .map(|line| {
+        let cells = line
+            .split(['|', ','])
+            .map(str::trim)
+            .filter(|cell| !cell.is_empty());
+        cells.map(|cell| cell.parse().unwrap()).collect()
+    })
+    .collect();
+    assert_eq!(rows.len(), 4);
+    let points = rows
+        .iter()
+        .map(|row| format!("{},{},{}\n", row[0] / 1e3, row[1] / 1e3, row[2] / 1e3));
+    place.write(
+        "stray.csv",
+        &format!("x_m,y_m,z_m\n{}", points.collect::<String>()),
+    );
+    for (design, column) in [("without.toml", 3), ("shielded.toml", 4)] {
+        let ran = place
+            .run(&["probe", design, "stray.csv", "--tolerance", "0.03"])
+            .ends(0);
+        let values: Vec<Vec<f64>> = (ran.out.lines().skip(1))
+            .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+            .collect();
+        for (shown, coils) in rows.iter().zip(values.chunks(9)) {
+            let sum = |k: usize| coils.iter().map(|row| row[k]).sum::<f64>();
+            let field_t = [4, 5, 6].map(sum).iter().map(|b| b * b).sum::<f64>().sqrt();
+            assert_eq!(
+                format!("{:.2}", 1e3 * field_t),
+                format!("{:.2}", shown[column]),
+                "{shown:?}"
+            );
+        }
+    }
 }
 
 fn the_replay_prints_what_is_shown() {
