@@ -10,8 +10,16 @@ const ROWS: usize = 4;
 /// # Panics
 /// When the slices' lengths do not fit together.
 pub fn product(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+    out.fill(0.0);
+    add_product(a, b, inner, out);
+}
+
+/// Adds what [`product`] gives to `out`.
+///
+/// # Panics
+/// As there.
+pub fn add_product(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
     if inner == 0 || out.is_empty() {
-        out.fill(0.0);
         return;
     }
     let whole = a.len().is_multiple_of(inner) && b.len().is_multiple_of(inner);
@@ -80,7 +88,9 @@ fn rows<const FMA: bool, const R: usize>(
 ) {
     for start in (0..columns).step_by(LANES) {
         let end = (start + LANES).min(columns);
-        let mut sums = [Lanes::splat(0.0); R];
+        let mut sums: [Lanes; R] = std::array::from_fn(|row| {
+            Lanes::load(&out[row * columns + start..row * columns + end])
+        });
         for l in 0..inner {
             let right = Lanes::load(&b[l * columns + start..l * columns + end]);
             for (row, sum) in sums.iter_mut().enumerate() {
@@ -111,6 +121,14 @@ mod tests {
                     .map(|l| a[i * inner + l] * b[l * columns + j])
                     .sum();
                 assert!((got - plain).abs() < 1e-13, "{rows} {inner} {columns}");
+            }
+            let once = out.clone();
+            add_product(&a, &b, inner, &mut out);
+            for (twice, once) in out.iter().zip(&once) {
+                assert!(
+                    (twice - 2.0 * once).abs() < 1e-13,
+                    "{rows} {inner} {columns}"
+                );
             }
             assert_eq!(transpose(&transpose(&a, inner), rows), a);
         }

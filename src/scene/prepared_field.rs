@@ -9,8 +9,8 @@ use crate::field::steel::array_steel::{ArraySteel, SteelField};
 const STEPS_OF_TWO: f64 = 16.0;
 /// Preparations held at a time: that of points, and that of the map about them.
 const HELD: usize = 2;
-/// Most moments of a preparation that is held: of hundreds of coils they take gigabytes.
-const MOST_MOMENTS: usize = 4_000_000;
+/// Most numbers of a preparation that is held.
+const MOST_NUMBERS: usize = 40_000_000;
 
 /// Clearances and tolerance that a field is prepared for, to the bit.
 type Key = [u64; 3];
@@ -48,7 +48,7 @@ impl PreparedField {
         let field = Arc::new(steel.field(lowest_m, distance_m, tolerance)?);
         if field
             .coupled()
-            .is_none_or(|dipoles| dipoles.count() * dipoles.drives() <= MOST_MOMENTS)
+            .is_none_or(|sources| sources.size() <= MOST_NUMBERS)
         {
             let mut held = held();
             held.truncate(HELD - 1);

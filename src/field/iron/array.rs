@@ -294,7 +294,7 @@ impl IronArray {
                 }));
             all.1.extend(moments);
         }
-        ArraySources::of_dipoles(drives, self.top_m, all.0, all.1)
+        ArraySources::of_dipoles(drives, self.top_m, all.0, &all.1)
     }
 
     /// B at a place off the steel's surface, inside or out, with `currents_a` in the windings, T.

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! q_own being the driven coil's own core under its own winding, solved on the fine outline.
-//! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
+//! Plain iteration stalls (the array's cores return each other's flux); a Krylov space needs a dozen steps.
 //! A few cores exchange potentials on their whole grids; many only what passes between them (see
 //! `reduced_coupling`).
 
@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use nalgebra::{DMatrix, DVector};
 
 use super::CoreShape;
+use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
 use super::equivalent_dipoles::{ArraySources, Near, spread_over};
@@ -535,6 +536,43 @@ impl CoupledArray {
         }
         layers
     }
+
+    /// The layers of all cores for some drives.
+    pub(super) fn core_layers<'a>(&'a self, drives: &'a [usize]) -> CoreLayers<'a> {
+        let (cores, response) = (self.positions_m.len(), &self.response);
+        let waves = 2 * response.layers.len() - 1;
+        match &self.potentials {
+            Potentials::Whole(potentials) => {
+                let all =
+                    (0..cores).flat_map(|core| drives.iter().map(move |drive| (*drive, core)));
+                let modes = all
+                    .clone()
+                    .map(|(drive, core)| response.modes_of(&potentials[drive][core]));
+                let mut on_nodes = response.layers_of_all(&modes.collect::<Vec<_>>());
+                for (place, _) in all.enumerate().filter(|(_, (drive, core))| drive == core) {
+                    let mut column = on_nodes.column_mut(place * waves);
+                    column += &self.own_layer;
+                }
+                CoreLayers::of_each((cores, drives.len()), waves, on_nodes)
+            }
+            Potentials::Reduced(received) => {
+                // The last pattern is the driven coil's own.
+                let on_nodes = received.on_nodes(response);
+                let own = on_nodes.ncols();
+                let mut on_nodes = on_nodes.resize_horizontally(own + waves, 0.0);
+                on_nodes.set_column(own, &self.own_layer);
+                let of_drive = move |place: usize| {
+                    let received = received.of_drive(drives[place]);
+                    let own = received.nrows();
+                    let mut all = received.resize_vertically(own + 1, 0.0);
+                    all[(own, drives[place])] = 1.0;
+                    all
+                };
+                let size = (cores, drives.len());
+                CoreLayers::of_patterns(size, waves, on_nodes, Box::new(of_drive))
+            }
+        }
+    }
 }
 
 impl ArraySources {
@@ -569,13 +607,10 @@ impl ArraySources {
         (lowest_m, distance_m, tolerance): (f64, f64, f64),
         many: bool,
     ) -> Self {
-        let response = &array.response;
         Self::new(
-            &response.outline,
+            &array.response.outline,
             &array.positions_m,
-            response.layers.len(),
-            drives.len(),
-            |drive, core| array.layers(drives[drive], core),
+            &array.core_layers(drives),
             Near {
                 lowest_m,
                 distance_m,

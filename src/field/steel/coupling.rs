@@ -10,6 +10,7 @@ use super::exchange::LEAST_GAP;
 use super::response::{Response, Ring};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::gauss;
 use fluxform_numerics::gmres::gmres;
 use fluxform_numerics::lagrange_basis::Basis;
@@ -214,12 +215,15 @@ pub(super) fn between_cores(
 ) -> DMatrix<f64> {
     let scale = -TAU / response.angles as f64 / (4.0 * PI);
     let mut matrix = DMatrix::zeros(points.len(), points.len());
-    for (mut column, from) in matrix.column_iter_mut().zip(points) {
-        fluxform_base::progress::poll();
-        for (value, (x, _)) in column.iter_mut().zip(points) {
-            *value = scale * dipole([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], *from);
-        }
-    }
+    dispatch::run(Dipoles {
+        receivers_m: [0, 1, 2].map(|axis| {
+            let offset_m = offset_m.get(axis).copied().unwrap_or(0.0);
+            points.iter().map(|(x, _)| x[axis] + offset_m).collect()
+        }),
+        senders: points,
+        scale,
+        matrix: matrix.as_mut_slice(),
+    });
     for sender_angle in 0..response.angles {
         let rings = response.exchange.rings.len();
         let mut columns = matrix.columns_mut(sender_angle * rings, rings);
@@ -248,6 +252,34 @@ fn dipole(x: [f64; 3], (y, n): GridPoint) -> f64 {
     let d = [x[0] - y[0], x[1] - y[1], x[2] - y[2]];
     let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (square * square.sqrt())
+}
+
+/// `scale` times the potentials of unit dipoles at some places, [receiver, sender].
+struct Dipoles<'a> {
+    receivers_m: [Vec<f64>; 3],
+    senders: &'a [GridPoint],
+    scale: f64,
+    matrix: &'a mut [f64],
+}
+
+impl Kernel for Dipoles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let rows = self.receivers_m[0].len();
+        for (column, (y, n)) in self.matrix.chunks_exact_mut(rows).zip(self.senders) {
+            fluxform_base::progress::poll();
+            for (group, out) in column.chunks_mut(LANES).enumerate() {
+                let axis =
+                    |axis: usize| Lanes::load(&self.receivers_m[axis][group * LANES..]) - y[axis];
+                let d = [axis(0), axis(1), axis(2)];
+                let square = d[0].mul_add::<FMA>(d[0], d[1].mul_add::<FMA>(d[1], d[2] * d[2]));
+                let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+                (along * self.scale / (square * square.sqrt())).store(out);
+            }
+        }
+    }
 }
 
 /// The columns of one angle of a sender's grid, one per ring, where its panels are long: `kernel`, of a

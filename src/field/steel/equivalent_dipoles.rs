@@ -2,7 +2,7 @@
 //!
 //! Seen from some distance a core's layer is its moments on rings that are no finer than the
 //! distance asks for, whatever the layer does at the edges. The dipoles of all cores are shared
-//! by all drives, which differ in their moments alone: one pass over them serves every drive.
+//! by all drives, which differ in their moments alone; from farther away fewer of them do.
 
 use crate::components::Components;
 use nalgebra::DMatrix;
@@ -11,15 +11,14 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use super::CoreShape;
+pub use super::array_sources::ArraySources;
+use super::array_sources::{DipolePlace, Level};
+use super::core_layers::CoreLayers;
 use super::generatrix::Generatrix;
 use super::response::{RingPanel, Rings, ring_panels};
-use super::symmetry::{Images, Motion, centre_m, motions};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
-use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 
-/// Points of one piece of work; fixed, so that results do not depend on threads.
-const CHUNK: usize = 64;
 /// Length of a ring panel relative to its distance from the points.
 const PANEL: f64 = 1.5;
 /// Points closer to the steel than this multiple of its radius are treated as this far.
@@ -32,17 +31,25 @@ const LEAST_ANGLES: usize = 3;
 const MOST_TOLERANCE: f64 = 0.3;
 /// Drives for which fewer dipoles are compared with those that are sure to do.
 const COMPARED_DRIVES: usize = 3;
-/// Cores about which they are compared.
-const COMPARED_CORES: usize = 3;
+/// Times that a place is compared, at as many angles.
+const COMPARED_ANGLES: usize = 5;
+/// Drives over which layers' largest values are looked for.
+const LARGEST_DRIVES: usize = 8;
+/// Growth of the distance from one level of dipoles to the next, at least, and most levels.
+const GROWTH: f64 = 2.0;
+const MOST_LEVELS: usize = 6;
 /// Powers of ten by which fewer dipoles may aim beside the tolerance.
 const MOST_LOOSENED: i32 = 6;
-/// The part of the tolerance that they may miss by at the places compared.
+/// The part of the tolerance that they may miss by at the places compared, and the part that those of one
+/// of many cores may.
 const COMPARED_SHARE: f64 = 0.1;
+const LEAST_SHARE: f64 = 0.02;
 
 /// Most digits by which the layer's parts may cancel in the field that is left.
 const MOST_CANCELLATION: f64 = 1e12;
 
 /// How close points come, and how exact their values are to be.
+#[derive(Clone, Copy)]
 pub(super) struct Near<'a> {
     pub(super) lowest_m: f64,
     pub(super) distance_m: f64,
@@ -64,10 +71,12 @@ impl Near<'_> {
         self.floor_m(shape).max(self.lowest_m - z_m)
     }
 
-    /// The gradient that errors at a height are relative to, T/m/A.
-    fn size_at(&self, z_m: f64) -> f64 {
+    /// The gradient that errors at a height are relative to, T/m/A, and the field, T/A.
+    fn sizes_at(&self, z_m: f64) -> [f64; 2] {
         let field = self.winding.field(self.winding.outer_radius_m, z_m);
-        field.map_or(f64::INFINITY, |field| field.gradient_norm())
+        field.map_or([f64::INFINITY; 2], |field| {
+            [field.gradient_norm(), field.b_r.hypot(field.b_z)]
+        })
     }
 }
 
@@ -109,48 +118,6 @@ fn angles_of(ratio: f64, modes: usize, tolerance: f64) -> usize {
     (modes + needed.max(LEAST_ANGLES)).min(MOST_ANGLES)
 }
 
-/// Position (m) and outer normal of every dipole of every core.
-fn dipole_places(rings: &Rings, angles: &[usize], positions_m: &[[f64; 2]]) -> Vec<[f64; 6]> {
-    let mut places = Vec::new();
-    for position in positions_m {
-        for (ring, angles) in rings.rings.iter().zip(angles) {
-            places.extend((0..*angles).map(|k| {
-                let (s, c) = (TAU * (k as f64 + 0.5) / *angles as f64).sin_cos();
-                [
-                    position[0] + ring.r_m * c,
-                    position[1] + ring.r_m * s,
-                    ring.z_m,
-                    ring.normal[0] * c,
-                    ring.normal[0] * s,
-                    ring.normal[1],
-                ]
-            }));
-        }
-    }
-    places
-}
-
-/// The moments of a core's dipoles from those of its rings' azimuthal modes, in the order of
-/// [`dipole_places`].
-fn dipole_moments(
-    by_mode: &DMatrix<f64>,
-    waves: &Waves,
-    angles: &[usize],
-    mut put: impl FnMut(usize, f64),
-) {
-    let mut place = 0;
-    for (ring, angles) in angles.iter().enumerate() {
-        let turn = TAU / *angles as f64;
-        let of_ring = by_mode.row(ring);
-        let of_ring_waves = waves.at(*angles);
-        for wave in of_ring_waves.chunks_exact(of_ring_waves.len() / angles) {
-            let moment: f64 = wave.iter().zip(of_ring.iter()).map(|(w, m)| w * m).sum();
-            put(place, turn * moment);
-            place += 1;
-        }
-    }
-}
-
 /// The azimuthal waves of a layer at every angle of a ring, for rings of every number of angles: 1, then
 /// cosine and sine of every mode.
 struct Waves(BTreeMap<usize, Vec<f64>>);
@@ -183,26 +150,60 @@ impl Waves {
     }
 }
 
-/// What dipoles are to stand for.
+/// What the dipoles of a level are to stand for.
 struct DipoleTask<'a> {
     outline: &'a Generatrix,
-    positions_m: &'a [[f64; 2]],
-    /// Azimuthal modes of a core's layer.
-    modes: usize,
-    near: &'a Near<'a>,
+    layers: &'a CoreLayers<'a>,
+    near: Near<'a>,
+    /// The gradient that errors at each height are relative to is no larger than here, m.
+    height_m: f64,
     panels: Vec<RingPanel>,
     /// By how much each panel's tolerance may be above the mean.
     slack: Vec<f64>,
+    /// The tolerance by which dipoles are sure to do.
+    tolerance: f64,
 }
 
-impl DipoleTask<'_> {
-    /// As many dipoles as `tolerance` asks for a priori, for some of the drives.
-    fn sources(
-        &self,
-        tolerance: f64,
-        drives: &[usize],
-        layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
-    ) -> ArraySources {
+/// Dipoles about a core at the origin.
+struct Dipoles {
+    places: Vec<DipolePlace>,
+    /// Their moments of every pattern, [dipole, pattern].
+    moments: DMatrix<f64>,
+}
+
+impl<'a> DipoleTask<'a> {
+    fn new(
+        outline: &'a Generatrix,
+        layers: &'a CoreLayers<'a>,
+        largest: &[f64],
+        near: Near<'a>,
+    ) -> Self {
+        let shape = outline.shape;
+        let floor_m = near.floor_m(shape);
+        let distance = |z_m: f64| near.clearance_m(shape, z_m);
+        let height_m = (shape.top_m.max(0.0) + floor_m).max(near.lowest_m);
+        let panels = ring_panels(shape, |z| PANEL * distance(z));
+        // A layer's parts cancel (a constant layer has no field at all), so that an error relative
+        // to one ring's field is a larger one relative to the field that is left.
+        let parts = parts_of_layer(outline, &panels, largest, distance);
+        let sum: f64 = parts.iter().sum();
+        let [size, _] = near.sizes_at(height_m);
+        let cancellation = (sum / size).clamp(1.0, MOST_CANCELLATION);
+        // Every panel may err by as much, whatever part of the sum it has.
+        let even = sum / parts.len() as f64;
+        Self {
+            outline,
+            layers,
+            near,
+            height_m,
+            slack: parts.iter().map(|part| even / part).collect(),
+            panels,
+            tolerance: near.tolerance / cancellation,
+        }
+    }
+
+    /// As many dipoles as `tolerance` asks for a priori.
+    fn dipoles(&self, tolerance: f64) -> Dipoles {
         let shape = self.outline.shape;
         let distance = |z_m: f64| self.near.clearance_m(shape, z_m);
         let of_panel: Vec<f64> = (self.slack.iter())
@@ -216,88 +217,89 @@ impl DipoleTask<'_> {
             .iter()
             .zip(&orders)
             .flat_map(|(tolerance, order)| std::iter::repeat_n(*tolerance, *order));
+        let modes = self.layers.modes();
         let angles: Vec<usize> = (rings.rings.iter().zip(of_ring))
-            .map(|(ring, aim)| angles_of(distance(ring.z_m) / ring.r_m, self.modes, aim))
+            .map(|(ring, aim)| angles_of(distance(ring.z_m) / ring.r_m, modes, aim))
             .collect();
-        let places = dipole_places(&rings, &angles, self.positions_m);
-        let a_core = places.len() / self.positions_m.len().max(1);
-        let columns = drives.len();
-        let mut moments = vec![0.0; places.len() * columns];
-        let waves = Waves::new(self.modes, &angles);
-        moments
-            .par_chunks_mut((a_core * columns).max(1))
-            .enumerate()
-            .for_each(|(core, out)| {
-                for (column, drive) in drives.iter().enumerate() {
-                    fluxform_base::progress::poll();
-                    let by_mode = rings.moments(&layers(*drive, core));
-                    dipole_moments(&by_mode, &waves, &angles, |place, moment| {
-                        out[place * columns + column] = moment;
-                    });
+        let waves = Waves::new(modes, &angles);
+        let count = angles.iter().sum();
+        let mut places = Vec::with_capacity(count);
+        let mut moments = DMatrix::zeros(count, self.layers.patterns());
+        let by_mode = rings.moments(self.layers.on_nodes());
+        for (number, (ring, angles)) in rings.rings.iter().zip(&angles).enumerate() {
+            let turn = TAU / *angles as f64;
+            let at = waves.at(*angles);
+            let of_ring: Vec<f64> = by_mode.row(number).iter().copied().collect();
+            for (k, wave) in at.chunks_exact(at.len() / angles).enumerate() {
+                let (s, c) = (turn * (k as f64 + 0.5)).sin_cos();
+                let of_patterns = of_ring.chunks_exact(wave.len());
+                for (pattern, amplitudes) in of_patterns.enumerate() {
+                    let moment: f64 = wave.iter().zip(amplitudes).map(|(w, m)| w * m).sum();
+                    moments[(places.len(), pattern)] = turn * moment;
                 }
-            });
-        ArraySources {
-            drives: columns,
-            top_m: shape.top_m,
-            places,
-            moments,
-            symmetry: Default::default(),
-        }
-    }
-
-    /// By how much the tolerance may be loosened so that the dipoles that are left still give what
-    /// those of `tolerance` give, within a part of what is requested.
-    fn fewest(
-        &self,
-        tolerance: f64,
-        height_m: f64,
-        drives: &[usize],
-        layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
-    ) -> f64 {
-        let shape = self.outline.shape;
-        let places = self.compared_places();
-        // Computed once: every comparison needs them.
-        let cores = self.positions_m.len();
-        let known: Vec<DMatrix<f64>> = (0..drives.len() * cores)
-            .into_par_iter()
-            .map(|i| layers(drives[i / cores], i % cores))
-            .collect();
-        let known = |drive: usize, core: usize| known[drive * cores + core].clone();
-        let columns: Vec<usize> = (0..drives.len()).collect();
-        let sizes: Vec<f64> = places
-            .iter()
-            .map(|[_, _, z]| self.near.size_at(z.max(shape.top_m.max(0.0)).max(height_m)))
-            .collect();
-        let values = |tolerance: f64| {
-            let sources = self.sources(tolerance, &columns, &known);
-            let mut out = vec![0.0; columns.len() * Components::Gradient.count() * places.len()];
-            sources.sample(&places, Components::Gradient, &mut out);
-            out
-        };
-        let sure = values(tolerance);
-        let loosened = |power: i32| 10_f64.powi(power);
-        let holds = |power: i32| {
-            let fewer = values(tolerance * loosened(power));
-            let rows = fewer
-                .chunks_exact(places.len())
-                .zip(sure.chunks_exact(places.len()));
-            rows.flat_map(|(fewer, sure)| fewer.iter().zip(sure).zip(&sizes))
-                .all(|((a, b), size)| (a - b).abs() <= COMPARED_SHARE * self.near.tolerance * size)
-        };
-        // The power that holds and the one that does not close in on each other.
-        let (mut good, mut bad) = (0, MOST_LOOSENED + 1);
-        while bad - good > 1 {
-            let middle = (good + bad).div_euclid(2);
-            if holds(middle) {
-                good = middle;
-            } else {
-                bad = middle;
+                let [n_r, n_z] = ring.normal;
+                places.push([ring.r_m * c, ring.r_m * s, ring.z_m, n_r * c, n_r * s, n_z]);
             }
         }
-        loosened(good)
+        Dipoles { places, moments }
     }
 
-    /// Places as close to some of the cores as any may be, and some farther ones.
+    /// As few dipoles as still give what those of the a-priori tolerance give, within a part of what is
+    /// requested.
+    fn fewest(&self) -> Dipoles {
+        let places_m = self.compared_places();
+        let sizes = self.sizes(&places_m);
+        let sure = self.dipoles(self.tolerance);
+        let known = sure.fields(&places_m);
+        let some = spread_over(self.layers.drives(), COMPARED_DRIVES);
+        let most = self.most();
+        let holds = |power: i32| {
+            let fewer = self.dipoles(self.tolerance * 10_f64.powi(power));
+            let off = self
+                .layers
+                .largest_sums(&(fewer.fields(&places_m) - &known), &some);
+            let holds = off
+                .iter()
+                .zip(sizes.iter().cycle())
+                .all(|(off, size)| *off <= most * size);
+            holds.then_some(fewer)
+        };
+        // The power that holds and the one that does not close in on each other.
+        let (mut good, mut bad, mut fewest) = (0, MOST_LOOSENED + 1, sure);
+        while bad - good > 1 {
+            let middle = (good + bad).div_euclid(2);
+            match holds(middle) {
+                Some(fewer) => (good, fewest) = (middle, fewer),
+                None => bad = middle,
+            }
+        }
+        fewest
+    }
+
+    /// By what one core's field may be off where it is compared, relative: the cores' errors add up.
+    fn most(&self) -> f64 {
+        let cores = self.layers.cores() as f64;
+        (COMPARED_SHARE / cores.sqrt()).max(LEAST_SHARE) * self.near.tolerance
+    }
+
+    /// What errors of every component at each of `places_m` are relative to.
+    fn sizes(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
+        let top_m = self.outline.shape.top_m.max(0.0);
+        let height = |z_m: f64| z_m.max(top_m).max(self.height_m);
+        let both: Vec<[f64; 2]> = places_m
+            .iter()
+            .map(|[_, _, z]| self.near.sizes_at(height(*z)))
+            .collect();
+        let gradient = Components::Gradient.count();
+        (0..Components::All.count())
+            .flat_map(|part| {
+                both.iter()
+                    .map(move |both| both[usize::from(part >= gradient)])
+            })
+            .collect()
+    }
+
+    /// Places as close to a core at the origin as any may be, and some farther ones.
     fn compared_places(&self) -> Vec<[f64; 3]> {
         let (shape, lowest_m) = (self.outline.shape, self.near.lowest_m);
         let floor_m = self.near.floor_m(shape);
@@ -322,31 +324,84 @@ impl DipoleTask<'_> {
             let z_m = shape.top_m - part * shape.length_m();
             [shape.radius_m + floor_m, z_m]
         });
-        let farther = [[0.0, 1.0], [1.0, 1.0], [2.0, 2.0]].map(|[r, z]| {
-            [
-                r * shape.radius_m,
-                shape.top_m + floor_m + z * shape.radius_m,
-            ]
-        });
+        // What decays slowly is seen from afar.
+        let farther = [[0.0, 1.0], [1.0, 1.0], [2.0, 2.0]];
+        let farther = farther.map(|by| by.map(|by| by * shape.radius_m));
+        let away = [[1.0, 1.0], [0.5, 3.0], [4.0, 4.0]];
+        let away = away.map(|by| by.map(|by| by * floor_m));
+        let farther: Vec<[f64; 2]> = (farther.iter().chain(&away))
+            .map(|[r_m, z_m]| [*r_m, shape.top_m + floor_m + z_m])
+            .collect();
         let about = close.iter().chain(&beside).chain(&farther);
-        let mut places = Vec::new();
-        for core in spread_over(self.positions_m.len(), COMPARED_CORES) {
-            let [x, y] = self.positions_m[core];
-            for [r_m, z_m] in about.clone() {
+        let about = about.map(|[r_m, z_m]| [*r_m, z_m.max(lowest_m)]);
+        let about: Vec<[f64; 2]> = about.collect();
+        (0..COMPARED_ANGLES * about.len())
+            .map(|k| {
+                let [r_m, z_m] = about[k % about.len()];
                 // No two at one angle.
-                let (s, c) = (2.399_963 * places.len() as f64).sin_cos();
-                places.push([x + r_m * c, y + r_m * s, z_m.max(lowest_m)]);
-            }
-        }
-        let clear = |place: &[f64; 3]| {
-            self.positions_m.iter().all(|[x, y]| {
-                let r_m = (place[0] - x).hypot(place[1] - y);
-                shape.distance_m(r_m, place[2]) >= 0.999 * floor_m
+                let (s, c) = (2.399_963 * k as f64).sin_cos();
+                [r_m * c, r_m * s, z_m]
             })
-        };
-        places.retain(clear);
-        places
+            .collect()
     }
+}
+
+impl Dipoles {
+    /// The field of every pattern at `places_m`, [component and place, pattern].
+    fn fields(&self, places_m: &[[f64; 3]]) -> DMatrix<f64> {
+        let (parts, columns) = (Components::All, self.moments.ncols());
+        let moments = self.moments.transpose();
+        let alone = ArraySources::of_dipoles(columns, 0.0, self.places.clone(), moments.as_slice());
+        let mut out = vec![0.0; parts.count() * places_m.len() * columns];
+        alone.sample_all(places_m, parts, &mut out);
+        DMatrix::from_vec(parts.count() * places_m.len(), columns, out)
+    }
+}
+
+/// Combinations of a core's patterns that give the field, from `task`'s distance on, of all that the
+/// patterns give within a part of the tolerance, and the patterns' amplitudes to theirs: [pattern,
+/// combination] and [combination, pattern].
+fn combinations(task: &DipoleTask<'_>, dipoles: &Dipoles) -> Option<[DMatrix<f64>; 2]> {
+    let places_m = task.compared_places();
+    let sizes = task.sizes(&places_m);
+    let largest = task.layers.largest_amplitudes()?;
+    let fields = dipoles.fields(&places_m);
+    let mut scaled = fields.clone();
+    for (mut column, largest) in scaled.column_iter_mut().zip(&largest) {
+        for (value, size) in column.iter_mut().zip(sizes.iter().cycle()) {
+            *value *= largest / size;
+        }
+    }
+    let all = scaled.svd(false, true).v_t?;
+    let of_first = |count: usize| {
+        let rows = all.rows(0, count);
+        let (mut patterns, mut amplitudes) = (rows.transpose(), rows.into_owned());
+        for (pattern, largest) in largest.iter().enumerate() {
+            patterns.row_mut(pattern).scale_mut(*largest);
+            let scale = if *largest > 0.0 { largest.recip() } else { 0.0 };
+            amplitudes.column_mut(pattern).scale_mut(scale);
+        }
+        [patterns, amplitudes]
+    };
+    let some = spread_over(task.layers.drives(), COMPARED_DRIVES);
+    let most = task.most();
+    let holds = |count: usize| {
+        let [patterns, amplitudes] = of_first(count);
+        let left = &fields - (&fields * patterns) * amplitudes;
+        let off = task.layers.largest_sums(&left, &some);
+        let mut pairs = off.iter().zip(sizes.iter().cycle());
+        pairs.all(|(off, size)| *off <= most * size)
+    };
+    let (mut bad, mut good) = (0, all.nrows());
+    while good - bad > 1 {
+        let middle = usize::midpoint(good, bad);
+        if holds(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    Some(of_first(good))
 }
 
 /// At most `most` of `count` indices, from the first to the last.
@@ -357,280 +412,72 @@ pub(super) fn spread_over(count: usize, most: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Dipoles that stand for all cores of an array, for every drive.
-#[derive(Debug, Clone)]
-pub struct ArraySources {
-    drives: usize,
-    top_m: f64,
-    /// Position (m) and outer normal of every dipole.
-    places: Vec<[f64; 6]>,
-    /// Layer moments of every dipole, [dipole, drive], A m^2 per ampere.
-    moments: Vec<f64>,
-    /// The array's centre, m, and its motions, where the drives are its coils; none otherwise.
-    symmetry: ([f64; 2], Vec<Motion>),
-}
-
 impl ArraySources {
-    /// The same, whose drives are the coils at `positions_m`, in their order: their symmetry is used.
-    pub(super) fn driven_by_coils(self, positions_m: &[[f64; 2]]) -> Self {
-        Self {
-            symmetry: (centre_m(positions_m), motions(positions_m)),
-            ..self
-        }
-    }
-
+    /// Dipoles for the cores at `positions_m`, whose outline is `outline` and which have `layers`.
     pub(super) fn new(
         outline: &Generatrix,
         positions_m: &[[f64; 2]],
-        modes: usize,
-        drives: usize,
-        layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
+        layers: &CoreLayers<'_>,
         near: Near<'_>,
     ) -> Self {
         let shape = outline.shape;
-        let floor_m = near.floor_m(shape);
-        let distance = |z_m: f64| near.clearance_m(shape, z_m);
-        // A layer's parts cancel (a constant layer has no field at all), so that an error relative
-        // to one ring's field is a larger one relative to the field that is left.
-        let largest = largest_layer(outline, positions_m.len(), drives, &layers);
-        let height_m = (shape.top_m.max(0.0) + floor_m).max(near.lowest_m);
-        let size = near.size_at(height_m);
-        let panels = ring_panels(shape, |z| PANEL * distance(z));
-        let parts = parts_of_layer(outline, &panels, &largest, distance);
-        let sum: f64 = parts.iter().sum();
-        let tolerance = near.tolerance / (sum / size).clamp(1.0, MOST_CANCELLATION);
-        // Every panel may err by as much, whatever part of the sum it has.
-        let even = sum / parts.len() as f64;
-        let task = DipoleTask {
-            outline,
-            positions_m,
-            modes,
-            near: &near,
-            slack: parts.iter().map(|part| even / part).collect(),
-            panels,
-        };
-        // A priori every part counts as if it stood alone and its layer were as rough as can be;
-        // how much less does is seen by comparison.
-        let fewer = if near.many {
-            let compared = spread_over(drives, COMPARED_DRIVES);
-            task.fewest(tolerance, height_m, &compared, &layers)
-        } else {
-            1.0
-        };
-        let every: Vec<usize> = (0..drives).collect();
-        task.sources(tolerance * fewer, &every, &layers)
-    }
-
-    /// Dipoles given as such: places (m) with unit normals, and layer moments [dipole, drive].
-    pub(crate) fn of_dipoles(
-        drives: usize,
-        top_m: f64,
-        places: Vec<[f64; 6]>,
-        moments: Vec<f64>,
-    ) -> Self {
-        Self {
-            drives,
-            top_m,
-            places,
-            moments,
-            symmetry: Default::default(),
-        }
-    }
-
-    /// The same at these currents of the drives, together one drive of one ampere.
-    ///
-    /// # Panics
-    /// When there are not as many currents as drives.
-    #[must_use]
-    pub fn at_currents(&self, currents_a: &[f64]) -> Self {
-        assert_eq!(currents_a.len(), self.drives);
-        let of_all = |moments: &[f64]| moments.iter().zip(currents_a).map(|(m, i)| m * i).sum();
-        let moments = self.moments.chunks_exact(self.drives);
-        let moments = moments.map(of_all).collect();
-        Self::of_dipoles(1, self.top_m, self.places.clone(), moments)
-    }
-
-    /// Number of drives.
-    #[must_use]
-    pub fn drives(&self) -> usize {
-        self.drives
-    }
-
-    /// Height of the cores' top, m.
-    #[must_use]
-    pub fn top_m(&self) -> f64 {
-        self.top_m
-    }
-
-    /// Number of dipoles.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.places.len()
-    }
-
-    /// The steel's field per ampere of every drive at `points_m`, [drive, component, point].
-    ///
-    /// # Panics
-    /// When `out` has another length than drives x components x points.
-    pub fn sample(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
-        let columns = self.drives * parts.count();
-        assert_eq!(out.len(), columns * points_m.len());
-        let (centre_m, motions) = &self.symmetry;
-        if motions.len() > 1 {
-            let images = Images::new(motions, *centre_m, points_m);
-            let mut sector = vec![0.0; columns * images.sector_m.len()];
-            self.sample_all(&images.sector_m, parts, &mut sector);
-            images.spread(parts, &sector, out);
-        } else {
-            self.sample_all(points_m, parts, out);
-        }
-    }
-
-    /// The same without the array's symmetry.
-    pub(super) fn sample_all(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
-        let columns = self.drives * parts.count();
-        let chunks: Vec<Vec<f64>> = points_m
-            .par_chunks(CHUNK)
-            .map(|points| {
-                dispatch::run(Pass {
-                    sources: self,
-                    points,
-                    parts,
-                })
-            })
-            .collect();
-        for (chunk, values) in chunks.iter().enumerate() {
-            let count = values.len() / columns;
-            for column in 0..columns {
-                let at = column * points_m.len() + chunk * CHUNK;
-                out[at..at + count].copy_from_slice(&values[column * count..(column + 1) * count]);
-            }
-        }
-    }
-}
-
-/// The largest layer on every node over all drives and cores, A per ampere.
-fn largest_layer(
-    outline: &Generatrix,
-    cores: usize,
-    drives: usize,
-    layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
-) -> Vec<f64> {
-    let of_core = |core: usize| {
-        let mut largest = vec![0.0_f64; outline.nodes.len()];
-        for drive in 0..drives {
-            for (largest, row) in largest.iter_mut().zip(layers(drive, core).row_iter()) {
-                *largest = largest.max(row.iter().map(|v| v.abs()).sum());
-            }
-        }
-        largest
-    };
-    let all: Vec<Vec<f64>> = (0..cores).into_par_iter().map(of_core).collect();
-    (0..outline.nodes.len())
-        .map(|node| all.iter().fold(0.0_f64, |m, core| m.max(core[node])))
-        .collect()
-}
-
-/// One chunk of points, [drive, component, point].
-struct Pass<'a> {
-    sources: &'a ArraySources,
-    points: &'a [[f64; 3]],
-    parts: Components,
-}
-
-impl Kernel for Pass<'_> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn run<const FMA: bool>(self) -> Vec<f64> {
-        match self.parts {
-            Components::Gz => self.run_parts::<FMA, 1>(),
-            Components::Force => self.run_parts::<FMA, 3>(),
-            Components::Gradient => self.run_parts::<FMA, 5>(),
-            Components::All => self.run_parts::<FMA, 8>(),
-        }
-    }
-}
-
-impl Pass<'_> {
-    #[inline(always)]
-    fn run_parts<const FMA: bool, const PARTS: usize>(self) -> Vec<f64> {
-        let drives = self.sources.drives;
-        let count = self.points.len();
-        let mut out = vec![0.0; drives * PARTS * count];
-        for (group, points) in self.points.chunks(LANES).enumerate() {
-            fluxform_base::progress::poll();
-            let axis = |i: usize| {
-                Lanes(std::array::from_fn(|lane| {
-                    points[lane.min(points.len() - 1)][i]
-                }))
+        let largest = layers.largest_on_nodes(&spread_over(layers.drives(), LARGEST_DRIVES));
+        let distances_m = distances_m(shape, positions_m, near);
+        let of_level = |distance_m: &f64| {
+            let near = Near {
+                distance_m: *distance_m,
+                ..near
             };
-            let (x, y, z) = (axis(0), axis(1), axis(2));
-            let mut sums = vec![[Lanes::splat(0.0); PARTS]; drives];
-            for (place, moments) in self
-                .sources
-                .places
-                .iter()
-                .zip(self.sources.moments.chunks_exact(drives))
-            {
-                let kernel = dipole::<FMA, PARTS>([x, y, z], place);
-                for (sum, moment) in sums.iter_mut().zip(moments) {
-                    let moment = Lanes::splat(*moment);
-                    for (sum, part) in sum.iter_mut().zip(&kernel) {
-                        *sum = part.mul_add::<FMA>(moment, *sum);
-                    }
+            let task = DipoleTask::new(outline, layers, &largest, near);
+            // A priori every part counts as if it stood alone and its layer were as rough as can be;
+            // how much less does is seen by comparison.
+            let dipoles = if near.many {
+                task.fewest()
+            } else {
+                task.dipoles(task.tolerance)
+            };
+            (task, dipoles)
+        };
+        let tasks: Vec<_> = distances_m.par_iter().map(of_level).collect();
+        let few = (near.many && layers.drives() > 1)
+            .then(|| combinations(&tasks[0].0, &tasks[0].1))
+            .flatten()
+            .filter(|[_, amplitudes]| amplitudes.nrows() < layers.drives());
+        let levels = tasks.into_iter().map(|(task, dipoles)| {
+            let Dipoles { places, moments } = dipoles;
+            let from_m = task.near.distance_m;
+            match &few {
+                Some([patterns, _]) => {
+                    Level::new(from_m, places, std::iter::once(moments * patterns))
+                }
+                None => {
+                    let cores = layers.of_cores(&moments);
+                    Level::new(from_m, places, cores.into_iter())
                 }
             }
-            for (drive, sum) in sums.iter().enumerate() {
-                for (part, value) in sum.iter().enumerate() {
-                    let at = (drive * PARTS + part) * count + group * LANES;
-                    let end = at + points.len();
-                    value.store(&mut out[at..end]);
-                }
-            }
-        }
-        out
+        });
+        let levels = levels.collect();
+        let amplitudes = few.and_then(|[_, amplitudes]| layers.amplitudes(&amplitudes));
+        Self::of_levels(shape, positions_m, layers.drives(), levels, amplitudes)
     }
 }
 
-/// Field of a layer element of unit moment: of a point dipole -n, A m^2.
-#[inline(always)]
-fn dipole<const FMA: bool, const PARTS: usize>(
-    [x, y, z]: [Lanes; 3],
-    place: &[f64; 6],
-) -> [Lanes; PARTS] {
-    let [px, py, pz, nx, ny, nz] = *place;
-    let (dx, dy, dz) = (x - px, y - py, z - pz);
-    let square = dx.mul_add::<FMA>(dx, dy.mul_add::<FMA>(dy, dz * dz));
-    let inverse2 = Lanes::splat(1.0) / square;
-    let inverse = inverse2.sqrt();
-    let inverse3 = inverse * inverse2;
-    let along = (dx * nx) + (dy * ny) + (dz * nz);
-    let scale = inverse3 * inverse2 * (-3.0 * MU_0_T_M_PER_A / (4.0 * PI));
-    // G_ij = scale (n_i d_j + n_j d_i + s (delta_ij - 5 d_i d_j / d^2)).
-    let steep = along * inverse2 * -5.0;
-    let zz = scale * (dz * (2.0 * nz) + along + steep * (dz * dz));
-    let mut out = [Lanes::splat(0.0); PARTS];
-    if PARTS == 1 {
-        out[0] = zz;
-        return out;
+/// Distances from a core from which on each level of dipoles is to do, m.
+fn distances_m(shape: CoreShape, positions_m: &[[f64; 2]], near: Near<'_>) -> Vec<f64> {
+    let floor_m = near.floor_m(shape);
+    let farthest = |[x, y]: &[f64; 2]| {
+        let [x0, y0] = positions_m[0];
+        (x - x0).hypot(y - y0)
+    };
+    let extent_m = positions_m.iter().map(farthest).fold(0.0, f64::max);
+    let growth = (extent_m / floor_m)
+        .powf(1.0 / MOST_LEVELS as f64)
+        .max(GROWTH);
+    let mut distances_m = vec![near.distance_m];
+    let mut next_m = growth * floor_m;
+    while next_m < extent_m {
+        distances_m.push(next_m);
+        next_m *= growth;
     }
-    let mut parts = [Lanes::splat(0.0); 8];
-    parts[0] = scale * (dx * (2.0 * nx) + along + steep * (dx * dx));
-    parts[1] = scale * (dy * nx + dx * ny + steep * (dx * dy));
-    parts[2] = scale * (dz * nx + dx * nz + steep * (dx * dz));
-    parts[3] = scale * (dz * ny + dy * nz + steep * (dy * dz));
-    parts[4] = zz;
-    if PARTS == 8 {
-        // B_i = scale s d_i + mu_0 n_i / (4 pi d^3).
-        let even = inverse3 * (MU_0_T_M_PER_A / (4.0 * PI));
-        let strength = scale * along;
-        parts[5] = strength * dx + even * nx;
-        parts[6] = strength * dy + even * ny;
-        parts[7] = strength * dz + even * nz;
-    }
-    // Those along z alone: the last of the gradient's.
-    let first = if PARTS == 3 { 2 } else { 0 };
-    out.copy_from_slice(&parts[first..first + PARTS]);
-    out
+    distances_m
 }

@@ -2,6 +2,7 @@
 
 pub mod array;
 pub mod array_cost;
+mod array_sources;
 pub mod array_steel;
 pub mod axial_table;
 pub mod bh_check;
@@ -9,6 +10,7 @@ pub mod bh_curve;
 pub mod bore;
 pub mod condensation;
 pub mod core_flux_density;
+mod core_layers;
 pub mod cored_coil;
 pub mod coupling;
 mod curve_refinement;

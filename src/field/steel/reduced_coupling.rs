@@ -24,11 +24,11 @@ use super::response::Response;
 use super::symmetry::{Motion, motions};
 use crate::winding::Winding;
 use fluxform_numerics::block_toeplitz::BlockToeplitz;
-use fluxform_numerics::gmres::gmres;
+use fluxform_numerics::shared_krylov::SharedSpace;
 
 /// Most applications of the exchange.
 const MOST_STEPS: usize = 120;
-/// Drives that are solved together: memory does not grow with their number.
+/// Drives whose residuals extend the space together.
 const TOGETHER: usize = 32;
 /// Distances, in the smallest of two axes, from which on fewer columns do.
 const DISTANCES: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
@@ -47,6 +47,11 @@ pub(super) struct Wave {
 }
 
 impl Wave {
+    /// Its column among those of [`Response::modes_of`].
+    fn column(&self) -> usize {
+        (2 * self.mode).saturating_sub(usize::from(!self.sine))
+    }
+
     fn on_grid(&self, angles: usize) -> DVector<f64> {
         let rings = self.rings.len();
         DVector::from_fn(rings * angles, |i, _| {
@@ -387,12 +392,35 @@ impl Received {
         let rings = response.exchange.rings.len();
         let mut modes = DMatrix::zeros(rings, 2 * response.layers.len() - 1);
         for (wave, coefficient) in self.waves.iter().zip(sum.iter()) {
-            let column = (2 * wave.mode).saturating_sub(usize::from(!wave.sine));
             modes
-                .column_mut(column)
+                .column_mut(wave.column())
                 .axpy(*coefficient, &wave.rings, 1.0);
         }
         modes
+    }
+}
+
+impl Received {
+    /// Layers of every wave on the nodes, [node, column of [`Response::modes_of`]] side by side.
+    pub(super) fn on_nodes(&self, response: &Response) -> DMatrix<f64> {
+        let columns = 2 * response.layers.len() - 1;
+        let mut out = DMatrix::zeros(response.outline.nodes.len(), columns * self.waves.len());
+        for (number, wave) in self.waves.iter().enumerate() {
+            let layer = &response.layers[wave.mode] * &wave.rings;
+            out.set_column(number * columns + wave.column(), &layer);
+        }
+        out
+    }
+
+    /// Potentials that every core receives for one drive, [wave, core].
+    pub(super) fn of_drive(&self, drive: usize) -> DMatrix<f64> {
+        let (first, motion) = self.from[drive];
+        let (motion, origins) = &self.motions[motion];
+        turned(
+            &self.waves,
+            motion,
+            &self.of_first[first].select_columns(origins),
+        )
     }
 }
 
@@ -632,8 +660,9 @@ impl<'a> ReducedCoupling<'a> {
                 }
             }),
         );
+        let mut space = SharedSpace::default();
         for drives in first.chunks(TOGETHER) {
-            let solved = self.solve_some(drives, residual, &mut reduced);
+            let solved = self.solve_some(drives, residual, &mut space, &mut reduced);
             let mut flux = self.flux_wb(&solved);
             for (column, drive) in drives.iter().enumerate() {
                 let of_drive = solved.column(column).into_owned();
@@ -660,7 +689,13 @@ impl<'a> ReducedCoupling<'a> {
     }
 
     /// Coefficients that every core receives, windings' and cores', for some drives.
-    fn solve_some(&self, drives: &[usize], residual: f64, reduced: &mut Reduced) -> DMatrix<f64> {
+    fn solve_some(
+        &self,
+        drives: &[usize],
+        residual: f64,
+        space: &mut SharedSpace,
+        reduced: &mut Reduced,
+    ) -> DMatrix<f64> {
         let cores = self.positions_m.len();
         let (rows, size) = (self.received.waves.len(), self.felt.waves.len());
         let mut windings = DMatrix::zeros(rows * cores, drives.len());
@@ -682,7 +717,7 @@ impl<'a> ReducedCoupling<'a> {
             let mut own = rhs.view_mut((drive * size, column), (size, 1));
             own += &self.own;
         }
-        let outcome = gmres(&rhs, residual, MOST_STEPS, |felt| {
+        let outcome = space.solve(&rhs, residual, MOST_STEPS, |felt| {
             felt - self.answers(self.send(felt))
         });
         reduced.relative_residual = reduced.relative_residual.max(outcome.relative_residual);

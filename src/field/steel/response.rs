@@ -206,7 +206,7 @@ impl Rings {
     /// Moments on the rings of layers on the nodes: [ring, layer], A m^2 a radian.
     #[must_use]
     pub fn moments(&self, layers: &DMatrix<f64>) -> DMatrix<f64> {
-        self.gather.tr_mul(layers)
+        self.gather.transpose() * layers
     }
 }
 
@@ -367,6 +367,22 @@ impl Response {
         for column in 0..modes.ncols() {
             let mode = column.div_ceil(2);
             out.set_column(column, &(&self.layers[mode] * modes.column(column)));
+        }
+        out
+    }
+}
+
+impl Response {
+    /// [`Response::layers_of`] for many, side by side.
+    pub(super) fn layers_of_all(&self, modes: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let waves = 2 * self.layers.len() - 1;
+        let mut out = DMatrix::zeros(self.outline.nodes.len(), waves * modes.len());
+        for wave in 0..waves {
+            let of_wave: Vec<_> = modes.iter().map(|modes| modes.column(wave)).collect();
+            let layers = &self.layers[wave.div_ceil(2)] * DMatrix::from_columns(&of_wave);
+            for (place, layer) in layers.column_iter().enumerate() {
+                out.set_column(place * waves + wave, &layer);
+            }
         }
         out
     }

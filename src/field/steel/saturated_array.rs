@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use super::CoreShape;
 use super::array::{ArrayResolution, closest_m};
+use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
 use super::curve_refinement::{AlongCurve, Level, Try, refined};
@@ -396,12 +397,15 @@ impl ArraySources {
         distance_m: f64,
         tolerance: f64,
     ) -> Self {
+        let waves = 2 * array.modes() - 1;
+        let all: Vec<_> = (0..array.positions_m.len())
+            .flat_map(|core| array.layers(core).column_iter())
+            .collect();
+        let layers = DMatrix::from_columns(&all);
         Self::new(
             array.outline(),
             &array.positions_m,
-            array.modes(),
-            1,
-            |_, core| array.layers(core).clone(),
+            &CoreLayers::of_each((array.positions_m.len(), 1), waves, layers),
             Near {
                 lowest_m,
                 distance_m,

@@ -177,3 +177,87 @@ fn few_dipoles_stand_for_cores_at_many_points() {
         }
     }
 }
+
+/// Every drive had dipoles of its own about every core: 225 coils took gigabytes, and minutes for a
+/// map.
+#[test]
+fn few_patterns_and_fewer_far_dipoles_stand_for_many_cores() {
+    let winding = Winding {
+        inner_radius_m: 0.0026,
+        outer_radius_m: 0.0045,
+        length_m: 0.04,
+        turns: 800.0,
+    };
+    let shape = CoreShape {
+        radius_m: 0.0025,
+        bottom_m: -0.045,
+        top_m: 0.0,
+    };
+    let positions_m: Vec<[f64; 2]> = (0..42)
+        .map(|i| [0.0097 * f64::from(i % 7), 0.0103 * f64::from(i / 7)])
+        .collect();
+    let (lowest_m, tolerance) = (0.0083, 1e-3);
+    let array = CoupledArray::new(&winding, shape, 470.0, &positions_m, 1e-3, lowest_m).unwrap();
+    let every: Vec<usize> = (0..positions_m.len()).collect();
+    let few = ArraySources::for_many_points(&array, lowest_m, lowest_m, tolerance);
+    // Dipoles of their own had 1300 numbers for a core and drive.
+    assert!(
+        few.size() < 100 * positions_m.len().pow(2),
+        "{}",
+        few.size()
+    );
+    let points: Vec<[f64; 3]> = (0..70)
+        .map(|k| {
+            let part = |step: f64| (0.5 + step * f64::from(k)).fract();
+            let (x, y) = (part(0.754_877_666), part(0.569_840_291));
+            let z_m = lowest_m * [1.0, 1.0, 1.7, 4.1][k as usize % 4];
+            [0.08 * x - 0.01, 0.07 * y - 0.01, z_m]
+        })
+        .collect();
+    let parts = Components::All;
+    let mut values = vec![0.0; every.len() * parts.count() * points.len()];
+    few.sample_all(&points, parts, &mut values);
+    let drives = [0, 24, 38];
+    // Three drives have dipoles of their own, and one core's do for all places.
+    let near = (lowest_m, lowest_m, 1e-6);
+    let mut sure = vec![0.0; drives.len() * parts.count() * points.len()];
+    ArraySources::of_drives(&array, &drives, near, false).sample(&points, parts, &mut sure);
+    let block = parts.count() * points.len();
+    for (drive, sure) in drives.iter().zip(sure.chunks_exact(block)) {
+        let values = &values[drive * block..(drive + 1) * block];
+        for (k, at) in points.iter().enumerate() {
+            let field = winding.field(winding.outer_radius_m, at[2]).unwrap();
+            for part in 0..parts.count() {
+                let size = if part < 5 {
+                    field.gradient_norm()
+                } else {
+                    field.b_r.hypot(field.b_z)
+                };
+                let off = (values[part * points.len() + k] - sure[part * points.len() + k]).abs();
+                assert!(
+                    off < tolerance * size,
+                    "{drive} {at:?} {part}: {:e}",
+                    off / size
+                );
+            }
+        }
+    }
+    // What is found at a place does not depend on the others.
+    let mut alone = vec![0.0; every.len() * parts.count()];
+    few.sample_all(&points[7..8], parts, &mut alone);
+    for (column, alone) in alone.iter().enumerate() {
+        assert_eq!(alone.to_bits(), values[column * points.len() + 7].to_bits());
+    }
+    // Together at currents.
+    let currents_a: Vec<f64> = every.iter().map(|i| (1.3 * *i as f64).sin()).collect();
+    let mut together = vec![0.0; block];
+    few.at_currents(&currents_a)
+        .sample(&points, parts, &mut together);
+    for (row, together) in together.iter().enumerate() {
+        let sum: f64 = (values.chunks_exact(block).zip(&currents_a))
+            .map(|(values, current)| current * values[row])
+            .sum();
+        let size = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        assert!((together - sum).abs() < 1e-10 * size, "{together} {sum}");
+    }
+}
