@@ -283,7 +283,7 @@ mod tests {
         let text = format!("{TEXT}[[iron]]\n{iron}");
         let (design, _) = Design::from_toml(&text, Path::new("d.toml"), Need::EVALUATE).unwrap();
         let scene = Scene::new(&design).unwrap();
-        let plot = scene.drawing();
+        let plot = scene.drawing().unwrap();
         plot.parts
             .into_iter()
             .filter(|part| part.role == Role::Iron)
