@@ -174,11 +174,11 @@ fn a_surface_that_bounds_no_body_is_refused_with_its_place() {
         "{said}"
     );
 
-    // A strip of five facets whose end is turned, closed by none.
+    // One facet bounds nothing.
     let flat = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]; 1];
     assert!(refused(&flat).contains("the mesh is open"));
     assert!(refused(&[[[0.0; 3]; 3]]).contains("no facet with an area"));
-    let said = refused(&vec![flat[0]; 1001]);
+    let said = refused(&[flat[0]; 1001]);
     assert!(
         said.contains("1001 facets, at most 1000") && said.contains("coarser"),
         "{said}"
