@@ -198,6 +198,7 @@ fn shards() -> Vec<Input> {
         limits_met: true,
         optimum: None,
         array: None,
+        iron: None,
     };
     let good = PointFile::new(&plan.plan_sha256, 0, Ok((row, Status::Done)));
     let failed = PointFile::new(&plan.plan_sha256, 0, Err("a reason".into()));
