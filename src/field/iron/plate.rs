@@ -109,6 +109,7 @@ pub enum Fault {
 
 impl Plate {
     /// Whether a map of the plane to itself, about the plate's middle, keeps its holes.
+    #[must_use]
     pub fn keeps_holes(&self, map: impl Fn([f64; 2]) -> [f64; 2]) -> bool {
         let from_middle = |site: &Site| [0, 1].map(|axis| site.at_m[axis] - self.centre_m[axis]);
         self.holes.iter().all(|hole| {
