@@ -28,7 +28,6 @@ pub mod random;
 pub mod real;
 pub mod refinement;
 pub mod ring_functions;
-pub mod shared_krylov;
 pub mod small_quadratic;
 pub mod solid_angle;
 pub mod spectral;

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! q_own being the driven coil's own core under its own winding, solved on the fine outline.
-//! Plain iteration stalls (the array's cores return each other's flux); a Krylov space needs a dozen steps.
+//! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
 //! A few cores exchange potentials on their whole grids; many only what passes between them (see
 //! `reduced_coupling`).
 

@@ -73,6 +73,20 @@ impl<'a> CoreLayers<'a> {
         &self.on_nodes
     }
 
+    /// Those of some drives where every layer is a pattern; `None` where patterns are shared.
+    pub(super) fn of_some(&self, drives: &[usize]) -> Option<Self> {
+        if self.amplitudes.is_some() {
+            return None;
+        }
+        let columns: Vec<usize> = (0..self.cores)
+            .flat_map(|core| drives.iter().map(move |drive| core * self.drives + drive))
+            .flat_map(|pattern| pattern * self.waves..(pattern + 1) * self.waves)
+            .collect();
+        let on_nodes = self.on_nodes.select_columns(&columns);
+        let size = (self.cores, drives.len());
+        Some(Self::of_each(size, self.waves, on_nodes))
+    }
+
     /// Of linear functions of the patterns, `[function, pattern]`, the largest magnitudes over all cores and
     /// the given drives.
     pub(super) fn largest_sums(&self, functions: &DMatrix<f64>, drives: &[usize]) -> Vec<f64> {

@@ -32,7 +32,7 @@ const MOST_TOLERANCE: f64 = 0.3;
 /// Drives for which fewer dipoles are compared with those that are sure to do.
 const COMPARED_DRIVES: usize = 3;
 /// Times that a place is compared, at as many angles.
-const COMPARED_ANGLES: usize = 5;
+const COMPARED_ANGLES: usize = 3;
 /// Drives over which layers' largest values are looked for.
 const LARGEST_DRIVES: usize = 8;
 /// Growth of the distance from one level of dipoles to the next, at least, and most levels.
@@ -202,8 +202,8 @@ impl<'a> DipoleTask<'a> {
         }
     }
 
-    /// As many dipoles as `tolerance` asks for a priori.
-    fn dipoles(&self, tolerance: f64) -> Dipoles {
+    /// As many dipoles as `tolerance` asks for a priori, for `layers` of the task's or some of them.
+    fn dipoles(&self, layers: &CoreLayers<'_>, tolerance: f64) -> Dipoles {
         let shape = self.outline.shape;
         let distance = |z_m: f64| self.near.clearance_m(shape, z_m);
         let of_panel: Vec<f64> = (self.slack.iter())
@@ -217,15 +217,15 @@ impl<'a> DipoleTask<'a> {
             .iter()
             .zip(&orders)
             .flat_map(|(tolerance, order)| std::iter::repeat_n(*tolerance, *order));
-        let modes = self.layers.modes();
+        let modes = layers.modes();
         let angles: Vec<usize> = (rings.rings.iter().zip(of_ring))
             .map(|(ring, aim)| angles_of(distance(ring.z_m) / ring.r_m, modes, aim))
             .collect();
         let waves = Waves::new(modes, &angles);
         let count = angles.iter().sum();
         let mut places = Vec::with_capacity(count);
-        let mut moments = DMatrix::zeros(count, self.layers.patterns());
-        let by_mode = rings.moments(self.layers.on_nodes());
+        let mut moments = DMatrix::zeros(count, layers.patterns());
+        let by_mode = rings.moments(layers.on_nodes());
         for (number, (ring, angles)) in rings.rings.iter().zip(&angles).enumerate() {
             let turn = TAU / *angles as f64;
             let at = waves.at(*angles);
@@ -249,31 +249,30 @@ impl<'a> DipoleTask<'a> {
     fn fewest(&self) -> Dipoles {
         let places_m = self.compared_places();
         let sizes = self.sizes(&places_m);
-        let sure = self.dipoles(self.tolerance);
-        let known = sure.fields(&places_m);
-        let some = spread_over(self.layers.drives(), COMPARED_DRIVES);
+        let drives = spread_over(self.layers.drives(), COMPARED_DRIVES);
+        // Where every layer is a pattern, only those of some drives are looked at.
+        let some = self.layers.of_some(&drives);
+        let layers = some.as_ref().unwrap_or(self.layers);
+        let known = self.dipoles(layers, self.tolerance).fields(&places_m);
         let most = self.most();
+        let loosened = |power: i32| self.tolerance * 10_f64.powi(power);
         let holds = |power: i32| {
-            let fewer = self.dipoles(self.tolerance * 10_f64.powi(power));
-            let off = self
-                .layers
-                .largest_sums(&(fewer.fields(&places_m) - &known), &some);
-            let holds = off
-                .iter()
-                .zip(sizes.iter().cycle())
-                .all(|(off, size)| *off <= most * size);
-            holds.then_some(fewer)
+            let fewer = self.dipoles(layers, loosened(power)).fields(&places_m);
+            let off = layers.largest_sums(&(fewer - &known), &drives);
+            let mut pairs = off.iter().zip(sizes.iter().cycle());
+            pairs.all(|(off, size)| *off <= most * size)
         };
         // The power that holds and the one that does not close in on each other.
-        let (mut good, mut bad, mut fewest) = (0, MOST_LOOSENED + 1, sure);
+        let (mut good, mut bad) = (0, MOST_LOOSENED + 1);
         while bad - good > 1 {
             let middle = (good + bad).div_euclid(2);
-            match holds(middle) {
-                Some(fewer) => (good, fewest) = (middle, fewer),
-                None => bad = middle,
+            if holds(middle) {
+                good = middle;
+            } else {
+                bad = middle;
             }
         }
-        fewest
+        self.dipoles(self.layers, loosened(good))
     }
 
     /// By what one core's field may be off where it is compared, relative: the cores' errors add up.
@@ -434,7 +433,7 @@ impl ArraySources {
             let dipoles = if near.many {
                 task.fewest()
             } else {
-                task.dipoles(task.tolerance)
+                task.dipoles(layers, task.tolerance)
             };
             (task, dipoles)
         };

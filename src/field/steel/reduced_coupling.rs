@@ -24,11 +24,11 @@ use super::response::Response;
 use super::symmetry::{Motion, motions};
 use crate::winding::Winding;
 use fluxform_numerics::block_toeplitz::BlockToeplitz;
-use fluxform_numerics::shared_krylov::SharedSpace;
+use fluxform_numerics::gmres::gmres;
 
 /// Most applications of the exchange.
 const MOST_STEPS: usize = 120;
-/// Drives whose residuals extend the space together.
+/// Drives that are solved together: memory does not grow with their number.
 const TOGETHER: usize = 32;
 /// Distances, in the smallest of two axes, from which on fewer columns do.
 const DISTANCES: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
@@ -660,9 +660,8 @@ impl<'a> ReducedCoupling<'a> {
                 }
             }),
         );
-        let mut space = SharedSpace::default();
         for drives in first.chunks(TOGETHER) {
-            let solved = self.solve_some(drives, residual, &mut space, &mut reduced);
+            let solved = self.solve_some(drives, residual, &mut reduced);
             let mut flux = self.flux_wb(&solved);
             for (column, drive) in drives.iter().enumerate() {
                 let of_drive = solved.column(column).into_owned();
@@ -689,13 +688,7 @@ impl<'a> ReducedCoupling<'a> {
     }
 
     /// Coefficients that every core receives, windings' and cores', for some drives.
-    fn solve_some(
-        &self,
-        drives: &[usize],
-        residual: f64,
-        space: &mut SharedSpace,
-        reduced: &mut Reduced,
-    ) -> DMatrix<f64> {
+    fn solve_some(&self, drives: &[usize], residual: f64, reduced: &mut Reduced) -> DMatrix<f64> {
         let cores = self.positions_m.len();
         let (rows, size) = (self.received.waves.len(), self.felt.waves.len());
         let mut windings = DMatrix::zeros(rows * cores, drives.len());
@@ -717,7 +710,7 @@ impl<'a> ReducedCoupling<'a> {
             let mut own = rhs.view_mut((drive * size, column), (size, 1));
             own += &self.own;
         }
-        let outcome = space.solve(&rhs, residual, MOST_STEPS, |felt| {
+        let outcome = gmres(&rhs, residual, MOST_STEPS, |felt| {
             felt - self.answers(self.send(felt))
         });
         reduced.relative_residual = reduced.relative_residual.max(outcome.relative_residual);
