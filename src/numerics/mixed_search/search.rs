@@ -99,6 +99,8 @@ pub struct Search<'a> {
     random: Random,
     /// Descents that came to their end, and where.
     ends: Vec<Vec<f64>>,
+    /// Where the first descent, a coarse one, ended.
+    near_given: Option<Vec<f64>>,
     /// Whether designs were spread over all ranges.
     spread: bool,
     /// Whether every design was evaluated.
@@ -115,6 +117,7 @@ impl<'a> Search<'a> {
             samples: Vec::new(),
             random: Random::new(settings.seed),
             ends: Vec::new(),
+            near_given: None,
             spread: false,
             complete: false,
         }
@@ -182,9 +185,10 @@ impl<'a> Search<'a> {
         let everywhere = vec![0.5; size];
         let spread = SPREAD + SPREAD_PER_VARIABLE * size;
         if !self.spread {
-            // What lies near the given design is known soon; whether it is the best is seen from afar.
+            // What lies near the given design is known soon; the next descent is one far from there.
             if let Some(center) = self.start(0).filter(|_| !self.spent()) {
-                self.descend(center, FIRST_WIDTH, COARSE)?;
+                let end = self.descend(center, FIRST_WIDTH, COARSE)?;
+                self.near_given = Some(end);
             }
             self.spread = true;
             self.scatter(&everywhere, 1.0, self.samples.len() + spread)?;
@@ -193,7 +197,10 @@ impl<'a> Search<'a> {
             if self.spent() {
                 break;
             }
-            let Some(center) = self.start(start) else {
+            // Where nothing is known far from the given design, what is near it counts.
+            let far = self.start(start);
+            let Some(center) = far.or_else(|| self.near_given.take().and_then(|_| self.start(0)))
+            else {
                 break;
             };
             let end = self.descend(center, FIRST_WIDTH, self.settings.finest)?;
@@ -292,14 +299,18 @@ impl<'a> Search<'a> {
         self.samples.len() >= self.settings.evaluations
     }
 
-    /// The first descent starts from the best design, others from the best of those that lie far from
-    /// every end.
+    /// A descent starts from the best design of those that lie far from every end; the first from one far from
+    /// where the coarse descent ended, if that is known.
     fn start(&self, number: usize) -> Option<usize> {
+        let ends = if number == 0 {
+            self.near_given.as_slice()
+        } else {
+            &self.ends
+        };
         let apart = |sample: &Sample| {
             let u = self.units(&sample.x);
-            self.ends
-                .iter()
-                .all(|end| distance(&u, &self.units(end)) > FIRST_WIDTH)
+            let far = |end: &Vec<f64>| distance(&u, &self.units(end)) > FIRST_WIDTH;
+            ends.iter().all(far)
         };
         let judged = self
             .samples
@@ -307,7 +318,7 @@ impl<'a> Search<'a> {
             .enumerate()
             .filter_map(|(index, sample)| {
                 let merit = self.judged(sample)?.merit();
-                (merit.is_finite() && (number == 0 || apart(sample))).then_some((merit, index))
+                (merit.is_finite() && apart(sample)).then_some((merit, index))
             });
         judged
             .reduce(|a, b| if b.0 > a.0 { b } else { a })
