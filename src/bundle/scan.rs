@@ -97,11 +97,11 @@ impl Scan {
             )));
         }
         let drives = drive_columns(&header, coils).map_err(one)?;
-        let mut wanted: Vec<String> = PLACE.map(str::to_owned).to_vec();
-        wanted.extend(quantities.iter().map(|quantity| quantity.column()));
-        wanted.extend(drives.iter().map(|(column, _)| column.clone()));
-        let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
-        let (columns, lines) = read_numbered(name, bytes, &wanted, &[])?;
+        let mut requested: Vec<String> = PLACE.map(str::to_owned).to_vec();
+        requested.extend(quantities.iter().map(|quantity| quantity.column()));
+        requested.extend(drives.iter().map(|(column, _)| column.clone()));
+        let requested: Vec<&str> = requested.iter().map(String::as_str).collect();
+        let (columns, lines) = read_numbered(name, bytes, &requested, &[])?;
         let (places, rest) = columns.split_at(3);
         let (measured, driven) = rest.split_at(quantities.len());
         let currents_a = flowing(name, &drives, driven, &lines, coils)?;

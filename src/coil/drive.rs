@@ -278,8 +278,11 @@ mod tests {
         for (steps, part) in [(1.0, 1e-6), (3.0, 2e-6)] {
             drive.hold(&[1.7], part * 0.7 / 1.3);
             drive.currents(&mut now);
-            let wanted = -1.7 * (-steps * 1e-6_f64).exp_m1();
-            assert!((now[0] / wanted - 1.0).abs() < 1e-14, "{now:?} {wanted}");
+            let requested = -1.7 * (-steps * 1e-6_f64).exp_m1();
+            assert!(
+                (now[0] / requested - 1.0).abs() < 1e-14,
+                "{now:?} {requested}"
+            );
         }
     }
 

@@ -237,10 +237,10 @@ mod tests {
                     (base.inner, other.inner, 4),
                     (base.by_length, other.by_length, 4),
                 ] {
-                    let wanted = x * unit.powi(power);
+                    let requested = x * unit.powi(power);
                     assert!(
-                        (y - wanted).abs() <= 1e-13 * wanted,
-                        "{a} {w} {l}: {y} {wanted}"
+                        (y - requested).abs() <= 1e-13 * requested,
+                        "{a} {w} {l}: {y} {requested}"
                     );
                 }
             }

@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn tables_as_programs_and_spreadsheets_write_them() {
-        let wanted = BhTable {
+        let requested = BhTable {
             b_t: vec![0.0, 0.7, 1.3],
             h_a_per_m: vec![0.0, 170.0, 1300.0],
         };
@@ -244,7 +244,7 @@ mod tests {
             "\n b_t , h_a_per_m\n\n0,0\n\n\n 0.7 ,170\n\"1.3\",1.3e3\n\n",
             "h_a_per_m,b_t\n0,0\n170,0.7\n1300,1.3\n",
         ] {
-            assert_eq!(read(text), Ok(wanted.clone()), "{text:?}");
+            assert_eq!(read(text), Ok(requested.clone()), "{text:?}");
         }
     }
 

@@ -208,7 +208,7 @@ enum Kind {
     Mesh,
 }
 
-/// What a kind of body must have.
+/// Required keys of a kind of body.
 fn required(kind: Kind) -> &'static [&'static str] {
     match kind {
         Kind::Box => &["size_mm"],
@@ -219,7 +219,7 @@ fn required(kind: Kind) -> &'static [&'static str] {
     }
 }
 
-/// What it may have also, and where it is.
+/// Optional keys, and its place.
 fn optional(kind: Kind) -> &'static [&'static str] {
     match kind {
         Kind::Mesh => &["unit", "translate_mm"],

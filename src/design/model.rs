@@ -109,7 +109,7 @@ impl Design {
             .collect()
     }
 
-    /// What each of them is, and its path, which may be replaced.
+    /// The role of each of them, and its path, which may be replaced.
     pub fn named_files_mut(&mut self) -> Vec<(Role, &mut PathBuf)> {
         let mut files = Vec::new();
         if let Some(Core {

@@ -11,7 +11,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// What a file that a design names is.
+/// The role of a file that a design names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The table of the cores' magnetisation.
@@ -23,7 +23,7 @@ pub enum Role {
 /// A file that a design names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedFile {
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// Where it is.
     pub path: PathBuf,

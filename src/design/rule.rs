@@ -142,8 +142,8 @@ impl Rule {
             return self.beyond(key, value, span);
         }
         let message = if value.is_finite() {
-            let wanted = self.bound.words(self.unit);
-            format!("expected {wanted}, found {}", quantity(value, self.unit))
+            let requested = self.bound.words(self.unit);
+            format!("expected {requested}, found {}", quantity(value, self.unit))
         } else {
             format!(
                 "expected a finite number{}, found {value}",

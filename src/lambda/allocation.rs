@@ -563,8 +563,8 @@ impl Allocator {
             let (mut fault, mut size) = (outside, range);
             if found.mu.is_finite() {
                 let pressure = found.mu * (g - found.center_n_per_a) + found.nu_v;
-                let wanted = (pressure * self.conductance_s[i]).clamp(lower, upper);
-                fault = fault.max((current - wanted).abs());
+                let requested = (pressure * self.conductance_s[i]).clamp(lower, upper);
+                fault = fault.max((current - requested).abs());
                 let terms = found.mu.abs() * (g.abs() + found.center_n_per_a.abs());
                 size += (terms + found.nu_v.abs()) * self.conductance_s[i];
             }

@@ -160,15 +160,18 @@ mod tests {
             resistance_ohm: &[6.0, 6.0],
         };
         let repeated = [0.7, 0.2, 0.7, 0.2, 0.7, 0.2, 0.3, 1.1];
-        let wanted = problem(&repeated, &[1.3, 1.3, 1.3, 0.9], None);
-        let wanted = check::<f64>(&wanted, 1.7, &[0.1, 0.3]);
+        let requested = problem(&repeated, &[1.3, 1.3, 1.3, 0.9], None);
+        let requested = check::<f64>(&requested, 1.7, &[0.1, 0.3]);
         for weights in &[[0.3, 0.1], [3.0, 1.0], [3e9, 1e9]] {
             let found = problem(&repeated[4..], &[1.3, 0.9], Some(weights));
             let found = check::<f64>(&found, 1.7, &[0.1, 0.3]);
             let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-14;
-            assert!(close(found.mean_square_n2, wanted.mean_square_n2));
-            assert!(close(found.gap_n2, wanted.gap_n2), "{found:?} {wanted:?}");
-            assert_eq!(found.worst_n, wanted.worst_n);
+            assert!(close(found.mean_square_n2, requested.mean_square_n2));
+            assert!(
+                close(found.gap_n2, requested.gap_n2),
+                "{found:?} {requested:?}"
+            );
+            assert_eq!(found.worst_n, requested.worst_n);
         }
     }
 }

@@ -161,7 +161,7 @@ fn most_wanted(
     slope_norm: Num,
 ) -> Vec<usize> {
     let noise = basis.noise() * slope_norm.to_f64();
-    let mut wanted: Vec<(usize, f64)> = basis
+    let mut requested: Vec<(usize, f64)> = basis
         .gradient_scales()
         .iter()
         .enumerate()
@@ -174,8 +174,8 @@ fn most_wanted(
             (gain > noise * scale.to_f64()).then(|| (i, gain / scale.to_f64()))
         })
         .collect();
-    wanted.sort_by(|a, b| b.1.total_cmp(&a.1));
-    wanted.into_iter().map(|(i, _)| i).collect()
+    requested.sort_by(|a, b| b.1.total_cmp(&a.1));
+    requested.into_iter().map(|(i, _)| i).collect()
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ impl Between<'_> {
         // Of both ends: the error of y, and the gradient <z G>.
         let mut unlimited = [0.0; 2];
         let mut gradient = [vec![0.0; coils], vec![0.0; coils]];
-        // What the forces may be off the line adds to either.
+        // The departure of the forces from the line adds to either.
         let (mut unlimited_off, mut gradient_off) = (0.0, vec![0.0; coils]);
         let y: Vec<f64> = (0..coils)
             .map(|i| self.mean(|one| one.unlimited_a_per_n_per_m[i]))

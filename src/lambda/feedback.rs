@@ -321,12 +321,12 @@ impl Sums {
         let coils = problem.coils();
         let row = &problem.forces_n_per_a[point * coils..(point + 1) * coils];
         let offset = problem.offset_n.map_or(0.0, |offset| offset[point]);
-        let wanted = lambda * problem.height_m[point];
-        let found = allocator.allocate(row, wanted - offset, &mut self.currents);
+        let requested = lambda * problem.height_m[point];
+        let found = allocator.allocate(row, requested - offset, &mut self.currents);
         let force = found.force_n + offset;
         let terms = row.iter().zip(&self.currents).map(|(g, i)| (g * i).abs());
-        let size = terms.sum::<f64>() + offset.abs() + wanted.abs();
-        let error = (force - wanted).abs();
+        let size = terms.sum::<f64>() + offset.abs() + requested.abs();
+        let error = (force - requested).abs();
         if error > ROUNDING * size {
             self.square += weight * error * error;
             self.worst = self.worst.max(error);

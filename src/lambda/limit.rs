@@ -20,7 +20,7 @@ use super::solve::constant;
 
 /// Ways to lay blocks of two by two cells; of scattered points every fourth is taken.
 const SUBSETS: usize = 4;
-/// What is left of a weight by rounding, of the largest.
+/// The rounding error of a weight, relative to the largest.
 const ROUNDING: f64 = 1e-9;
 /// A rule of twice the spacing differs from the points by so many times their error.
 const SPACING_TO_ERROR: f64 = 3.0;

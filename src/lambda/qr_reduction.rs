@@ -363,9 +363,9 @@ mod tests {
                 assert_eq!(reduced.rank(), 3);
                 let clean = reduced.with_clean_dependences().unwrap();
                 assert_eq!(clean.rank(), 2);
-                let wanted = if kept { share } else { 0.0 };
-                for (found, wanted) in clean.columns[2].iter().zip([1.0, wanted, 0.0]) {
-                    let off = (found.to_f64() / length - wanted).abs();
+                let requested = if kept { share } else { 0.0 };
+                for (found, requested) in clean.columns[2].iter().zip([1.0, requested, 0.0]) {
+                    let off = (found.to_f64() / length - requested).abs();
                     assert!(off < 1e-25, "{length} {share}: {off}");
                 }
             }

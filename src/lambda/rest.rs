@@ -27,12 +27,12 @@ pub(super) const COST: f64 = 1e-15;
 /// Ends the path where it comes to rest; whether that left out any piece.
 pub(super) fn bring_to_rest(trace: &mut Trace, offset: Option<&[Num]>, slope: &[Num]) -> bool {
     let square = |v: &[Num]| Num::dot(v, v);
-    let wanted = [offset.map_or(Num::ZERO, square), square(slope)];
+    let requested = [offset.map_or(Num::ZERO, square), square(slope)];
     let pieces = &mut trace.pieces;
     // From the end back, as far as rest costs nothing: at most as many turns as pieces.
     let mut rest = None;
     for k in (0..pieces.len()).rev() {
-        if !(k..pieces.len()).all(|later| is_free(pieces, k, later, slope, &wanted)) {
+        if !(k..pieces.len()).all(|later| is_free(pieces, k, later, slope, &requested)) {
             break;
         }
         rest = Some(k);
@@ -50,7 +50,7 @@ pub(super) fn bring_to_rest(trace: &mut Trace, offset: Option<&[Num]>, slope: &[
 }
 
 /// Whether the currents at the start of piece `k` cost nothing on all of piece `later`.
-fn is_free(pieces: &[Piece], k: usize, later: usize, slope: &[Num], wanted: &[Num; 2]) -> bool {
+fn is_free(pieces: &[Piece], k: usize, later: usize, slope: &[Num], requested: &[Num; 2]) -> bool {
     let (here, there) = (&pieces[k], &pieces[later]);
     let start = there.start;
     let mut still = here.residual.clone();
@@ -60,10 +60,10 @@ fn is_free(pieces: &[Piece], k: usize, later: usize, slope: &[Num], wanted: &[Nu
     // The cost less what is allowed, at `start + step`: c + b step + a step^2.
     let c = Num::dot(&still, &still)
         - Num::dot(best, best)
-        - allowed * (wanted[0] + start * start * wanted[1]);
+        - allowed * (requested[0] + start * start * requested[1]);
     let b = Num::of(2.0)
-        * (Num::dot(&still, slope) - Num::dot(best, rate) - allowed * start * wanted[1]);
-    let a = Num::dot(slope, slope) - Num::dot(rate, rate) - allowed * wanted[1];
+        * (Num::dot(&still, slope) - Num::dot(best, rate) - allowed * start * requested[1]);
+    let a = Num::dot(slope, slope) - Num::dot(rate, rate) - allowed * requested[1];
     let length = pieces.get(later + 1).map(|next| next.start - start);
     never_positive(a, b, c, length)
 }
@@ -96,13 +96,13 @@ mod tests {
             never_positive(Num::of(a), Num::of(b), Num::of(c), length.map(Num::of))
         };
         // -(s - 0.7)^2 + 0.01 is above zero from 0.6 to 0.8.
-        for (length, wanted) in [
+        for (length, requested) in [
             (Some(0.5), true),
             (Some(0.65), false),
             (Some(1.3), false),
             (None, false),
         ] {
-            assert_eq!(never(-1.0, 1.4, -0.48, length), wanted, "{length:?}");
+            assert_eq!(never(-1.0, 1.4, -0.48, length), requested, "{length:?}");
         }
         assert!(never(-1.0, 1.4, -0.5, None) && never(0.0, -0.3, 0.0, None));
         assert!(!never(0.0, 0.3, -7.0, None) && !never(1e-9, -0.3, -7.0, None));

@@ -214,17 +214,18 @@ fn rounding(model: &Model, trace: &Trace, heights: &[Num]) -> f64 {
     let mut worst = 1.0_f64;
     for piece in &trace.pieces {
         // On the first piece everything grows with lambda: its rates will do.
-        let (x, residual, wanted) = if piece.start > Num::ZERO {
+        let (x, residual, requested) = if piece.start > Num::ZERO {
             (&piece.x, &piece.residual, piece.start * size)
         } else {
             (&piece.x_rate, &piece.residual_rate, size)
         };
-        if wanted > Num::ZERO {
+        if requested > Num::ZERO {
             let moved = x
                 .iter()
                 .zip(&model.norm)
                 .fold(Num::ZERO, |s, (&x, &n)| s + x.abs() * n);
-            let share = Num::dot(residual, residual).sqrt() / wanted * (moved / wanted + Num::ONE);
+            let share =
+                Num::dot(residual, residual).sqrt() / requested * (moved / requested + Num::ONE);
             worst = worst.max(share.to_f64());
         }
     }

@@ -206,7 +206,7 @@ impl<'a> Tableau<'a> {
         (total + column_weights) / self.matrix.at(w, w)
     }
 
-    /// What moves, from a column of the matrix and the multiplier; the pivot takes what is left of `total`.
+    /// The changes, from a column of the matrix and the multiplier; the pivot takes the rest of `total`.
     fn moved(&self, column: &[Num], nu: Num, total: Num) -> Vec<Num> {
         let mut x = vec![Num::ZERO; self.model.count()];
         let mut left = total;
@@ -510,8 +510,8 @@ mod tests {
                 let sum = [0, 2, 4, 7]
                     .iter()
                     .fold(Num::ZERO, |sum, &k| sum + inverse(i, k) * before.at(k, j));
-                let wanted = if i == j { Num::ONE } else { Num::ZERO };
-                assert!((sum - wanted).abs().to_f64() < 1e-28);
+                let requested = if i == j { Num::ONE } else { Num::ZERO };
+                assert!((sum - requested).abs().to_f64() < 1e-28);
             }
         }
         for k in [0, 2, 4, 7] {

@@ -70,7 +70,7 @@ pub fn between_magnets_n(moment_a_m2: [f64; 3], from_first_m: [f64; 3]) -> [f64;
     })
 }
 
-/// What one pair comes to.
+/// The result of one pair.
 struct Pair {
     given: [bool; 2],
     power_w: [f64; 2],
@@ -188,7 +188,7 @@ fn one_pair(
         let point = pair[finger];
         lambda * upward.height_m[point] * problem.direction[point][axis]
     };
-    let wanted = |finger: usize, axis: usize| {
+    let requested = |finger: usize, axis: usize| {
         let pull = upward.offset_n.map_or(0.0, |all| all[pair[finger]]);
         request(finger, axis) - of_magnets[finger][axis] - if axis == 2 { pull } else { 0.0 }
     };
@@ -198,7 +198,7 @@ fn one_pair(
     let solved = |first_axis: usize| -> (bool, f64) {
         let fingers = (0..2).flat_map(|finger| (first_axis..3).map(move |axis| (finger, axis)));
         let rows: Vec<_> = fingers
-            .map(|(finger, axis)| (row(finger, axis), wanted(finger, axis)))
+            .map(|(finger, axis)| (row(finger, axis), requested(finger, axis)))
             .collect();
         let mut currents = vec![0.0; coils];
         let error_n = allocate(upward, &rows, &mut currents);

@@ -124,7 +124,7 @@ impl Rows<'_> {
         }
     }
 
-    /// What currents must give at `lambda`, N.
+    /// The force that currents must give at `lambda`, N.
     fn of_currents(&self, lambda: f64) -> [f64; 3] {
         let [x, y, z] = self.request.map(|part| lambda * part);
         [x, y, z - self.offset_n]
@@ -247,15 +247,15 @@ impl<'a> Search<'a> {
     }
 
     fn asked(&mut self, rows: &Rows, lambda: f64) -> Asked {
-        let wanted = rows.of_currents(lambda);
+        let target = rows.of_currents(lambda);
         let found = self
             .allocator
-            .allocate(&self.rows, wanted, &mut self.currents);
+            .allocate(&self.rows, target, &mut self.currents);
         if found.reach == Reach::Reached {
             return Asked::Given;
         }
         let nearest = found.force_n;
-        let normal: [f64; 3] = std::array::from_fn(|k| wanted[k] - nearest[k]);
+        let normal: [f64; 3] = std::array::from_fn(|k| target[k] - nearest[k]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let [x, y, z] = nearest;
         let crossing = dot(normal, [x, y, z + rows.offset_n]) / dot(normal, rows.request);
@@ -320,7 +320,7 @@ struct GivenCurrents<'a> {
 
 impl GivenCurrents<'_> {
     fn at(&mut self, rows: &Rows, lambda: f64) -> Reach {
-        let wanted = rows.of_currents(lambda);
+        let target = rows.of_currents(lambda);
         match self.currents_of {
             CurrentsOf::Static(currents) => {
                 self.currents.copy_from_slice(currents);
@@ -329,12 +329,12 @@ impl GivenCurrents<'_> {
             CurrentsOf::Upward => {
                 let found = self
                     .upward
-                    .allocate(rows.axes[2], wanted[2], &mut self.currents);
+                    .allocate(rows.axes[2], target[2], &mut self.currents);
                 found.reach
             }
             CurrentsOf::Vector => {
                 rows.fill(&mut self.rows);
-                let found = self.vector.allocate(&self.rows, wanted, &mut self.currents);
+                let found = self.vector.allocate(&self.rows, target, &mut self.currents);
                 found.reach
             }
         }

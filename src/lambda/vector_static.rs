@@ -229,7 +229,7 @@ struct Vectors<'a> {
     points: usize,
     /// Of a watt, N^2/W.
     price: f64,
-    /// What all coils at their limits take, W.
+    /// The power of all coils at their limits, W.
     most_w: f64,
 }
 

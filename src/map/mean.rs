@@ -251,7 +251,7 @@ impl<'a> MeanField<'a> {
     fn source_row(&self, [ox, oy, oz]: [f64; 3], z_m: f64) -> Result<Option<Vec<Table>>, MapError> {
         fluxform_base::progress::poll();
         let z_m = z_m + oz;
-        let wanted = if self.count == 1 {
+        let requested = if self.count == 1 {
             Components::Gz
         } else {
             Components::Gradient
@@ -264,7 +264,7 @@ impl<'a> MeanField<'a> {
         };
         let nodes = layout.nodes();
         let heights = vec![z_m; nodes.len()];
-        let values = self.source.gradients(&nodes, &heights, aim, wanted)?;
+        let values = self.source.gradients(&nodes, &heights, aim, requested)?;
         let mut tables = vec![layout.table(&values.dbz_dz)];
         if self.count > 1 {
             tables.push(layout.table(&values.dbr_dz_over_r));

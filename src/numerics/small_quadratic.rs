@@ -242,9 +242,9 @@ mod tests {
                 row([-1.0 + angle, angle, 0.0], 1.3 * (-1.0 + angle)),
             ];
             let minimum = minimise(one, [-2.0, -1.0, -0.4], &rows).expect("feasible");
-            for (found, wanted) in minimum.step.iter().zip([1.3, 0.0, 0.4]) {
+            for (found, requested) in minimum.step.iter().zip([1.3, 0.0, 0.4]) {
                 assert!(
-                    (found - wanted).abs() < 1e-15 / angle,
+                    (found - requested).abs() < 1e-15 / angle,
                     "{angle:e}: {found:e}"
                 );
             }

@@ -37,7 +37,7 @@ pub struct SceneIron {
     pub(super) top_m: f64,
     /// Flux density above which a warning is due: the least of all bodies, T.
     pub knee_t: f64,
-    /// What was put right in meshes.
+    /// Repairs of meshes, as warnings.
     pub put_right: Vec<String>,
 }
 

@@ -14,7 +14,7 @@ const MESH_MAX_BYTES: u64 = 64 << 20;
 /// A file that a design names, and its bytes.
 #[derive(Debug, Clone)]
 pub struct NamedContent {
-    /// What it is, and where.
+    /// Its role and path.
     pub file: NamedFile,
     /// Its name in a bundle.
     pub kept_name: String,

@@ -14,7 +14,7 @@ use crate::field::steel::passive::{NoPull, Region, spread};
 
 /// Share of the tolerance given to the magnet's dipoles.
 const MAGNET_SHARE: f64 = 0.1;
-/// What the table may add, relative to the tolerance.
+/// Error that the table may add, relative to the tolerance.
 const TABLE_SHARE: f64 = 0.3;
 /// Attempts at the table, each with ten times less error aimed at.
 const ATTEMPTS: usize = 3;

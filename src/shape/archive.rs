@@ -61,9 +61,9 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// The name under which a part is kept: `wanted` in any case, without a leading slash.
-    pub(super) fn find(&self, wanted: &str) -> Option<String> {
-        self.names.get(&sought(wanted)).cloned()
+    /// The name under which a part is kept: `requested` in any case, without a leading slash.
+    pub(super) fn find(&self, requested: &str) -> Option<String> {
+        self.names.get(&sought(requested)).cloned()
     }
 
     /// The names of all parts that have one.

@@ -27,7 +27,7 @@ pub struct ClosedBodies {
     pub vertices_m: Vec<[f64; 3]>,
     /// Of every body its facets, anticlockwise as seen from outside, those of its cavities among them.
     pub bodies: Vec<Vec<[u32; 3]>>,
-    /// What was put right.
+    /// Repairs, as warnings.
     pub warnings: Vec<String>,
 }
 
@@ -257,13 +257,13 @@ impl Soup {
                 next += 1;
                 let own = turned[facet] == Some(true);
                 for (other, same_way) in &neighbours[facet] {
-                    let wanted = own != *same_way;
+                    let requested = own != *same_way;
                     match turned[*other] {
                         None => {
-                            turned[*other] = Some(wanted);
+                            turned[*other] = Some(requested);
                             part.push(*other);
                         }
-                        Some(is) if is != wanted => {
+                        Some(is) if is != requested => {
                             let at = place_mm(self.corners(*other)[0]);
                             return Err(ShapeError::Document(format!(
                                 "the mesh has one side only, as a Moebius strip, seen at {at}: it bounds no body"

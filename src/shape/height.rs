@@ -359,7 +359,7 @@ pub(super) fn sample_of(triangles: &[Triangle], contacts: &[(u32, Contact)]) -> 
     hit.sample(triangles)
 }
 
-/// The higher hit. At equal heights the face seen from above is wanted: any face before a wall,
+/// The higher hit. At equal heights the face seen from above is requested: any face before a wall,
 /// one that rises from there before one that does not (a dome before its base), of two that rise
 /// the steeper, of two that do not the flatter; then the larger normal. Equal keys give the same
 /// sample either way, so the order of the triangles does not matter.

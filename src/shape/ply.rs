@@ -231,7 +231,8 @@ fn check(header: &Header, length: usize) -> Result<(), ReadError> {
     let property = |element: &str, names: &[&str]| {
         let found = header.elements.iter().find(|(name, _)| *name == element);
         found.is_some_and(|(_, element): (_, &ElementDef)| {
-            let known = |wanted: &&str| element.properties.iter().any(|(name, _)| name == wanted);
+            let known =
+                |requested: &&str| element.properties.iter().any(|(name, _)| name == requested);
             names.iter().any(known)
         })
     };

@@ -337,7 +337,7 @@ mod tests {
             let at = |v: [f64; 3]| v.map(|c| c * unit);
             let triangle = [[0.0, 0.0, 0.2], [7.0, 0.0, 0.2], [0.0, 3.0, 0.2]].map(at);
             let seen = Seen::new(&triangle, 1e-3 * unit);
-            for (below, wanted) in [
+            for (below, requested) in [
                 (-0.1, Contact::Covers(0.2 * unit)),
                 (0.9e-3, Contact::Near(0.2 * unit)),
                 (1.1e-3, Contact::None),
@@ -345,7 +345,7 @@ mod tests {
                 (2.0, Contact::None),
             ] {
                 let p = [1.3 * unit, -below * unit];
-                assert_eq!(seen.contact(p), wanted, "{power} {below}");
+                assert_eq!(seen.contact(p), requested, "{power} {below}");
             }
         }
     }

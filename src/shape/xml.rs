@@ -38,13 +38,13 @@ impl<'a> Element<'a> {
     }
 
     /// The value of the attribute with this local name.
-    pub(super) fn get(&self, wanted: &str) -> Option<Cow<'_, str>> {
-        self.find(|key| local(key) == wanted)
+    pub(super) fn get(&self, requested: &str) -> Option<Cow<'_, str>> {
+        self.find(|key| local(key) == requested)
     }
 
     /// The value of the attribute with this full name.
-    pub(super) fn get_exact(&self, wanted: &str) -> Option<Cow<'_, str>> {
-        self.find(|key| key == wanted)
+    pub(super) fn get_exact(&self, requested: &str) -> Option<Cow<'_, str>> {
+        self.find(|key| key == requested)
     }
 
     fn find(&self, is: impl Fn(&str) -> bool) -> Option<Cow<'_, str>> {

@@ -110,7 +110,7 @@ fn the_gate_runs_the_readmes_tests_in_empty_folders() {
         .lines()
         .find(|line| line.starts_with("cargo test"))
         .expect("the README says how the tests are run");
-    let at = |wanted: &str| gate.lines().position(|line| line == wanted);
+    let at = |expected: &str| gate.lines().position(|line| line == expected);
     let tests = at(command).unwrap_or_else(|| panic!(".ci/run does not run `{command}`"));
     for folder in [
         "TMPDIR",

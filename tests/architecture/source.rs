@@ -38,8 +38,8 @@ impl Source {
 
     /// Whether the tokens of `pattern`, separated by blanks, occur in a row.
     pub fn has(&self, pattern: &str) -> bool {
-        let wanted: Vec<&str> = pattern.split(' ').collect();
-        self.tokens.windows(wanted.len()).any(|w| w == wanted)
+        let expected: Vec<&str> = pattern.split(' ').collect();
+        self.tokens.windows(expected.len()).any(|w| w == expected)
     }
 
     /// The root of the file's crate: the member, or nothing for the root package.

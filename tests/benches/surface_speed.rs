@@ -207,8 +207,8 @@ fn measure(
     if let Some(body) = body {
         let nodes = side.nodes();
         let off = found.iter().enumerate().filter_map(|(k, sample)| {
-            let wanted = body.height_m(nodes[k % SAMPLES], nodes[k / SAMPLES]);
-            Some((sample.as_ref()?.height_m - wanted).abs())
+            let expected = body.height_m(nodes[k % SAMPLES], nodes[k / SAMPLES]);
+            Some((sample.as_ref()?.height_m - expected).abs())
         });
         let (wrong, worst) = off.fold((0, 0.0f64), |(wrong, worst), off| {
             (wrong + usize::from(off > WRONG_M), worst.max(off))

@@ -100,8 +100,8 @@ for point, row, pull, height, currents, force, answer in found:
     vector = 'requested_direction' in bundle.map
     line = [*row, pull, height, code, force[2] if vector else force, *currents]
     if vector:
-        wanted = (code != 2) * bundle.requested_force([point])[0]
-        line += [*wanted, *force[:2], *bundle.force_vectors_per_ampere([point])[0].ravel()]
+        expected = (code != 2) * bundle.requested_force([point])[0]
+        line += [*expected, *force[:2], *bundle.force_vectors_per_ampere([point])[0].ravel()]
     if 'robust_setting' in bundle.map:
         chosen, given, _ = bundle.currents([point], robust=True)
         line += [*(given[0] if vector else [0, 0, given[0]]), *chosen[0]]

@@ -403,7 +403,7 @@ fn a_bundle_keeps_the_mesh_and_verifies_from_its_copy() {
     let head = String::from_utf8_lossy(&coils);
     // Windings as rings of 48 sides, and the twelve facets.
     assert!(head.contains("NumberOfPolys=\"396\""), "{}", &head[..400]);
-    // What was cached belongs to the bytes, not to the name: computed anew, the bundle would differ.
+    // What was cached belongs to the bytes, not to the name: computed again, the bundle would differ.
     place.write("bar.stl", &bar([50.0, 24.0, 3.0]));
     place
         .run(&["verify", "out/pair/flat"])

@@ -146,10 +146,10 @@ fn agrees_with_direct_integration() {
             .enumerate()
         {
             // Implicit Euler is of first order: one extrapolation.
-            let wanted = 2.0 * fine[i] - coarse[i];
+            let expected = 2.0 * fine[i] - coarse[i];
             assert!(
-                (found / wanted - 1.0).abs() < 1e-4,
-                "{step:?}: {found} {wanted}"
+                (found / expected - 1.0).abs() < 1e-4,
+                "{step:?}: {found} {expected}"
             );
         }
     }
@@ -172,14 +172,14 @@ fn agrees_with_the_inverted_laplace_transform() {
             core_energy_share: value("core_energy_share"),
             air_share: value("air_share"),
         });
-        for (found, wanted) in [
+        for (found, expected) in [
             (found.current_95_s, value("current_95_s")),
             (found.force_95_s, value("force_95_s")),
         ] {
             assert!(
-                (found / wanted - 1.0).abs() < 1e-12,
-                "{case}: {found} {wanted}: {:e}",
-                found / wanted - 1.0
+                (found / expected - 1.0).abs() < 1e-12,
+                "{case}: {found} {expected}: {:e}",
+                found / expected - 1.0
             );
         }
     }

@@ -10,9 +10,9 @@ use crate::scenario::{Found, Prepared};
 use crate::table::Row;
 use fluxform_testing::{Random, inputs::OUT, place::Place, run::Ran};
 
-/// Kills until `wanted` runs have been killed; half of the moments are spread evenly over the run, half lie
+/// Kills until `expected` runs have been killed; half of the moments are spread evenly over the run, half lie
 /// close behind a change in its folder.
-pub fn at_random(prepared: &Prepared, wanted: usize, random: &mut Random) -> Result<Row, String> {
+pub fn at_random(prepared: &Prepared, expected: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(prepared.scenario.name, "SIGKILL at a random moment");
     let changed = {
         let place = prepared.fresh();
@@ -21,8 +21,8 @@ pub fn at_random(prepared: &Prepared, wanted: usize, random: &mut Random) -> Res
         child.wait().unwrap();
         changed.max(1)
     };
-    for attempt in 0..3 * wanted {
-        if row.struck == wanted {
+    for attempt in 0..3 * expected {
+        if row.struck == expected {
             break;
         }
         let place = prepared.fresh();

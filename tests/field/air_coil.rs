@@ -307,21 +307,21 @@ fn a_point_beyond_all_measure_has_a_field() {
     for d in [1e7, 1.1e8, 1.3e8, 1e12, 1e15, 1e20, 1e60] {
         let (far, k) = (at(d), 1e6 / d);
         let size = near.b_z.hypot(near.b_r) * k * k * k;
-        for (found, wanted) in [(far.b_z, near.b_z), (far.b_r, near.b_r)] {
+        for (found, expected) in [(far.b_z, near.b_z), (far.b_r, near.b_r)] {
             assert!(
-                (found - wanted * k * k * k).abs() < 1e-12 * size,
+                (found - expected * k * k * k).abs() < 1e-12 * size,
                 "{d:e}: {found:e}"
             );
         }
         let size = near.gradient_norm() * k.powi(4);
-        for (found, wanted) in [
+        for (found, expected) in [
             (far.dbz_dz, near.dbz_dz),
             (far.dbr_dz, near.dbr_dz),
             (far.dbr_dr, near.dbr_dr),
             (far.br_over_r, near.br_over_r),
         ] {
             assert!(
-                (found - wanted * k.powi(4)).abs() < 1e-12 * size,
+                (found - expected * k.powi(4)).abs() < 1e-12 * size,
                 "{d:e}: {found:e}"
             );
         }

@@ -38,11 +38,11 @@ fn scaled(values: &[f64], by: f64) -> Vec<f64> {
 }
 
 #[track_caller]
-fn assert_close(found: f64, wanted: f64, relative: f64) {
+fn assert_close(found: f64, expected: f64, relative: f64) {
     assert!(
-        (found - wanted).abs() <= relative * wanted.abs(),
-        "{found:e} instead of {wanted:e}: {:e}",
-        (found - wanted).abs() / wanted.abs()
+        (found - expected).abs() <= relative * expected.abs(),
+        "{found:e} instead of {expected:e}: {:e}",
+        (found - expected).abs() / expected.abs()
     );
 }
 

@@ -41,7 +41,7 @@ fn main() {
         .and_then(|s| s.parse().ok())
         .unwrap_or(5.0);
     let seed = option("--seed").and_then(|s| s.parse().ok()).unwrap_or(1);
-    let wanted = option("--kind");
+    let expected = option("--kind");
     std::panic::set_hook(Box::new(|_| {}));
     let folder = std::env::temp_dir().join("fluxform-fuzz");
     let harness = Harness {
@@ -66,7 +66,10 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|");
     let mut well = true;
     for kind in kinds::all() {
-        if wanted.as_deref().is_some_and(|wanted| wanted != kind.name) {
+        if expected
+            .as_deref()
+            .is_some_and(|expected| expected != kind.name)
+        {
             continue;
         }
         let start = Instant::now();

@@ -283,7 +283,7 @@ fn main() {
         .and_then(|s| s.parse().ok())
         .unwrap_or(10.0);
     let seed = option("--seed").and_then(|s| s.parse().ok()).unwrap_or(1);
-    let wanted = option("--format");
+    let expected = option("--format");
     std::panic::set_hook(Box::new(|_| {}));
     watch();
     println!(
@@ -294,7 +294,7 @@ fn main() {
     for name in FORMATS {
         let format = SurfaceFormat::of(&Path::new("f").with_extension(name));
         let format = format.expect("an ending that is read");
-        if wanted.as_deref().is_none_or(|wanted| wanted == name) {
+        if expected.as_deref().is_none_or(|expected| expected == name) {
             well &= run(name, format, seconds, seed);
         }
     }

@@ -17,7 +17,7 @@ struct Problem {
 
 /// Result of an exhaustive search.
 struct Exhaustive {
-    /// The largest force in the wanted direction.
+    /// The largest force in the expected direction.
     most_n: f64,
     /// The least power that gives the requested force.
     power_w: Option<f64>,
@@ -250,28 +250,33 @@ fn exhaustive_search_over_all_states_finds_nothing_better() {
         worst = worst.max(certificate);
         assert!(certificate <= 1e-12, "{certificate:e} {}", context());
         assert!(problem.judged(&currents).is_some(), "{}", context());
-        let wanted = problem.wanted_n.abs();
+        let expected = problem.wanted_n.abs();
         let sign = problem.wanted_n.signum();
-        let want = wanted.min(exhaustive.most_n.max(0.0)) * sign;
+        let want = expected.min(exhaustive.most_n.max(0.0)) * sign;
         let missing = (found.force_n - want).abs();
         assert!(missing <= 1e-12 * size, "{missing:e} {}", context());
         match found.reach {
             Reach::Reached => {
                 reached += 1;
                 assert!(
-                    wanted <= exhaustive.most_n.max(0.0) + 1e-12 * size,
+                    expected <= exhaustive.most_n.max(0.0) + 1e-12 * size,
                     "{}",
                     context()
                 );
             }
             Reach::Saturated => {
                 saturated += 1;
-                assert!(wanted >= exhaustive.most_n - 1e-12 * size, "{}", context());
+                assert!(
+                    expected >= exhaustive.most_n - 1e-12 * size,
+                    "{}",
+                    context()
+                );
             }
         }
         sums += usize::from(found.nu_v != 0.0);
         // Next to the largest force the search's own rounding decides its power.
-        if let (Some(least), true) = (exhaustive.power_w, wanted < 0.999_999 * exhaustive.most_n) {
+        if let (Some(least), true) = (exhaustive.power_w, expected < 0.999_999 * exhaustive.most_n)
+        {
             let power = problem.power_w(&currents);
             assert!(
                 power <= least * (1.0 + 1e-8),
@@ -470,7 +475,7 @@ fn limits_that_no_array_has_are_refused() {
 fn the_certificate_measures_every_fault() {
     let (force, ohm) = ([0.7, 1.3, -0.2], [6.0, 5.0, 7.0]);
     let (lower, upper) = ([0.0, 0.0, -0.4], [1.5, 0.8, 0.9]);
-    for (total, wanted) in [
+    for (total, expected) in [
         (None, 1.1),
         (Some(1.1), 1.2),
         (Some(1.1), -9.0),
@@ -478,16 +483,16 @@ fn the_certificate_measures_every_fault() {
     ] {
         let mut allocator = Allocator::new(&ohm, &lower, &upper, total).unwrap();
         let mut currents = [0.0; 3];
-        let found = allocator.allocate(&force, wanted, &mut currents);
-        let judged = |currents: &[f64], wanted: f64, found: &Allocation| {
-            allocator.certificate(&force, wanted, currents, found)
+        let found = allocator.allocate(&force, expected, &mut currents);
+        let judged = |currents: &[f64], expected: f64, found: &Allocation| {
+            allocator.certificate(&force, expected, currents, found)
         };
-        assert!(judged(&currents, wanted, &found) < 1e-14, "{wanted}");
+        assert!(judged(&currents, expected, &found) < 1e-14, "{expected}");
         // A current that is not the optimum's, to either side.
         for (i, step) in [(0, 0.01), (1, -0.02), (2, 0.03)] {
             let mut other = currents;
             other[i] += step;
-            assert!(judged(&other, wanted, &found) > 1e-3, "{wanted}: {i}");
+            assert!(judged(&other, expected, &found) > 1e-3, "{expected}: {i}");
         }
         if found.reach == Reach::Reached {
             // The missing force over the sizes of its terms.
@@ -496,8 +501,8 @@ fn the_certificate_measures_every_fault() {
                 .zip(&currents)
                 .map(|(g, i)| (g * i).abs())
                 .sum();
-            let missing = judged(&currents, wanted + 0.1, &found);
-            let wanted_fault = 0.1 / (size + wanted + 0.1);
+            let missing = judged(&currents, expected + 0.1, &found);
+            let wanted_fault = 0.1 / (size + expected + 0.1);
             assert!((missing - wanted_fault).abs() < 1e-12, "{missing}");
             // Multipliers of another problem.
             for other in [
@@ -510,7 +515,7 @@ fn the_certificate_measures_every_fault() {
                     ..found
                 },
             ] {
-                assert!(judged(&currents, wanted, &other) > 1e-3);
+                assert!(judged(&currents, expected, &other) > 1e-3);
             }
         }
     }

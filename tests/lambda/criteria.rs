@@ -302,7 +302,7 @@ fn bad_inputs_have_answers_in_every_form() {
             felt(&problem, 0.07, DETECTION_THRESHOLD_N).expect("well formed"),
         )
     };
-    // No heights: nothing is wanted.
+    // No heights: nothing is target.
     let none = Case {
         heights: vec![0.0; 3],
         ..plain.clone()

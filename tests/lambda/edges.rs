@@ -49,7 +49,7 @@ fn nothing_to_render_and_no_force_requested_are_results() {
     assert_eq!(solution.path.error_n2(7.0), 0.0);
 }
 
-/// Nothing is wanted there, so no error can be a share of it.
+/// Nothing is target there, so no error can be a share of it.
 #[test]
 fn an_error_is_relative_only_where_a_force_is_requested() {
     let at = |lambda: f64| {
@@ -294,9 +294,9 @@ fn too_strong_a_force_is_felt_as_well() {
         for share in [0.0, 0.07, 0.3] {
             let found = felt(&case.problem(), share, threshold_n).unwrap().unwrap();
             // lambda h - c <= f and 3 f <= lambda h + c, while c is above share lambda h.
-            let wanted = 2.0 * threshold_n / height;
-            let off = (found.lambda_n_per_m / wanted - 1.0).abs();
-            assert!(off < 1e-12, "{share}: {found:?} {wanted}");
+            let target = 2.0 * threshold_n / height;
+            let off = (found.lambda_n_per_m / target - 1.0).abs();
+            assert!(off < 1e-12, "{share}: {found:?} {target}");
         }
     }
 }

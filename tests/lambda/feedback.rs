@@ -352,8 +352,11 @@ fn what_falls_between_layers_is_seen() {
     };
     // The parabola's own lowest point.
     for (step, least) in [(0.1_f64, 0.03_f64), (0.1, 0.05), (0.2, 0.07)] {
-        let wanted = 0.7 * least.min(step - least).powi(2);
-        assert!((dip(step, least) - wanted).abs() < 1e-12, "{step} {least}");
+        let expected = 0.7 * least.min(step - least).powi(2);
+        assert!(
+            (dip(step, least) - expected).abs() < 1e-12,
+            "{step} {least}"
+        );
     }
     // Nothing falls below a slope's end, nor with fewer than three layers.
     assert_eq!(dip(0.1, 3.0), 0.0);

@@ -170,8 +170,8 @@ fn robust_currents_are_the_best_of_all_states_of_the_coils() {
                         matrix[(i, i)] += square * moments.driver_square * row[i] * row[i];
                     }
                     if turn == 0 {
-                        let wanted = request[axis] - if axis == 2 { *pull } else { 0.0 };
-                        linear += row * (weight * moments.gain * moments.along * wanted);
+                        let target = request[axis] - if axis == 2 { *pull } else { 0.0 };
+                        linear += row * (weight * moments.gain * moments.along * target);
                     }
                 }
             }

@@ -60,9 +60,9 @@ impl Sample {
                 let row = &self.axes[axis][point * COILS..(point + 1) * COILS];
                 let given: f64 = row.iter().zip(currents).map(|(g, i)| g * i).sum();
                 let pull = if axis == 2 { self.offset[point] } else { 0.0 };
-                let wanted = lambda * self.heights[point] * self.direction[point][axis];
+                let expected = lambda * self.heights[point] * self.direction[point][axis];
                 let scale = if axis == 2 { 1.0 } else { weight };
-                scale * (given + pull - wanted)
+                scale * (given + pull - expected)
             };
             (0..3).map(|axis| part(axis).powi(2)).sum::<f64>().sqrt()
         };

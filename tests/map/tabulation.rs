@@ -131,10 +131,10 @@ impl AxialSource for Raised {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Components,
+        expected: Components,
     ) -> Result<Gradients, OnEdge> {
         let z_m = self.below(z_m);
-        self.winding.gradients(r_m, &z_m, tolerance, wanted)
+        self.winding.gradients(r_m, &z_m, tolerance, expected)
     }
 
     fn axial_fields(&self, r_m: &[f64], z_m: &[f64], tolerance: f64) -> Result<Vec<f64>, OnEdge> {

@@ -43,10 +43,10 @@ fn main() {
         .position(|word| word == "--command")
         .and_then(|at| words.get(at + 1));
     let chosen = |commands: &[commands::Writes]| -> Vec<_> {
-        let wanted = commands
+        let expected = commands
             .iter()
             .filter(|writes| only.is_none_or(|only| writes.name == only));
-        wanted.copied().collect()
+        expected.copied().collect()
     };
     let mut rows = run::rows(&chosen(commands::COMMANDS), 1);
     rows.extend(run::rows(&chosen(commands::MEASURES), MEASURES_EVERY));

@@ -49,8 +49,8 @@ fn a_table_with_facts_seconds_and_a_picture() {
         ["lambda_n_per_m"]
         .as_f64()
         .unwrap();
-    let wanted: f64 = lines[1].split(',').nth(4).unwrap().parse().unwrap();
-    assert!((wanted / (0.05 * lambda) - 1.0).abs() < 1e-12);
+    let target: f64 = lines[1].split(',').nth(4).unwrap().parse().unwrap();
+    assert!((target / (0.05 * lambda) - 1.0).abs() < 1e-12);
     assert!(lines[3].starts_with("0.04,0.3,0,0.05,0,0,0,0,") && lines[3].ends_with(",outside"));
     let facts: Value = serde_json::from_str(&place.text("replay.json")).unwrap();
     assert_eq!(facts["schema_version"], "1.4.0");

@@ -44,7 +44,7 @@ fn moment(opened: &Opened) -> [f64; 3] {
     moment_a_m2(&Design::read(&path, Need::SWEEP).unwrap().0)
 }
 
-fn wanted(rows: &FingerRows, row: usize) -> [f64; 3] {
+fn expected(rows: &FingerRows, row: usize) -> [f64; 3] {
     let [x, y] = rows.wanted_sideways_n.get(row).copied().unwrap_or_default();
     [x, y, rows.wanted_force_n[row]]
 }
@@ -83,7 +83,7 @@ fn both_get_their_force_from_coils_and_from_the_other_s_magnet() {
                 } else {
                     opened.bundle.force_vector_per_ampere(at, &mut per_ampere);
                 }
-                let request = wanted(finger, row);
+                let request = expected(finger, row);
                 let scale = 1e-3 * request[2].abs().max(0.01);
                 for axis in axes.clone() {
                     let terms = per_ampere.iter().zip(rows.currents_a(row));

@@ -113,22 +113,22 @@ fn a_tessellated_cylinder_has_the_largest_difference_of_its_knots() {
             .collect();
         // Both are polylines: the difference is largest at a knot of either.
         let inside = knots.iter().filter(|k| k[0] >= -0.69 && k[0] <= 0.68);
-        let wanted = inside.fold([0.0_f64; 2], |[above, below], [x, z]| {
+        let expected = inside.fold([0.0_f64; 2], |[above, below], [x, z]| {
             let off = z - line(&nodes, *x);
             [above.max(off), below.max(-off)]
         });
-        let wanted = nodes.iter().fold(wanted, |[above, below], [x, z]| {
+        let expected = nodes.iter().fold(expected, |[above, below], [x, z]| {
             let off = line(&knots, *x) - z;
             [above.max(off), below.max(-off)]
         });
         let (found, apart) = certified(&mesh, &plan);
         assert!(
-            (found.above.value_m - wanted[0]).abs() < 1e-13,
-            "{samples}: {found:?} {wanted:?}"
+            (found.above.value_m - expected[0]).abs() < 1e-13,
+            "{samples}: {found:?} {expected:?}"
         );
         assert!(
-            (found.below.value_m - wanted[1]).abs() < 1e-13,
-            "{samples}: {found:?} {wanted:?}"
+            (found.below.value_m - expected[1]).abs() < 1e-13,
+            "{samples}: {found:?} {expected:?}"
         );
         let apart = apart.unwrap();
         assert!(
@@ -341,9 +341,9 @@ fn fans_t_junctions_and_doubled_faces_change_nothing() {
         .collect();
     let base: Vec<Triangle> = (1..299).map(|k| [rim[0], rim[k], rim[k + 1]]).collect();
     let plan = grid((0.0, 1.0, 7), (0.0, 1.0, 6));
-    let (wanted, _) = certified(&exact(fan.clone()), &plan);
+    let (expected, _) = certified(&exact(fan.clone()), &plan);
     // The apex protrudes of its cell.
-    assert!(wanted.above.at_m == [0.51, 0.47], "{wanted:?}");
+    assert!(expected.above.at_m == [0.51, 0.47], "{expected:?}");
     let mut closed = [fan.clone(), base].concat();
     closed.extend_from_slice(&fan[..50]);
     // The base hidden, faces twice, and some halved at a point of their rim side only.
@@ -354,11 +354,11 @@ fn fans_t_junctions_and_doubled_faces_change_nothing() {
         closed.extend([[a, b, m], [a, m, c]]);
     }
     let (found, _) = certified(&exact(closed), &plan);
-    assert_eq!(found.above.at_m, wanted.above.at_m);
-    assert!((found.above.value_m - wanted.above.value_m).abs() < 1e-15);
+    assert_eq!(found.above.at_m, expected.above.at_m);
+    assert!((found.above.value_m - expected.above.value_m).abs() < 1e-15);
     assert!(
-        (found.below.value_m - wanted.below.value_m).abs() < 1e-11,
-        "{found:?} {wanted:?}"
+        (found.below.value_m - expected.below.value_m).abs() < 1e-11,
+        "{found:?} {expected:?}"
     );
 }
 
@@ -395,8 +395,8 @@ fn sheets_over_each_other_take_no_longer_than_the_highest() {
     };
     let ridge = roof(&[[-1.0, 0.9], [0.31, 1.7], [2.0, 0.9]], [-1.0, 2.0]);
     let plan = grid((0.0, 1.0, 16), (0.0, 1.0, 14));
-    let (wanted, _) = certified(&exact(ridge.clone()), &plan);
-    assert!(wanted.above.value_m > 1e-3, "{wanted:?}");
+    let (expected, _) = certified(&exact(ridge.clone()), &plan);
+    assert!(expected.above.value_m > 1e-3, "{expected:?}");
     let below = |k: usize| 0.01 * k as f64 - 2.0;
     let stacks: [Vec<Triangle>; 4] = [
         // Level, steep, crossing each other, and one sheet many times.
@@ -411,10 +411,10 @@ fn sheets_over_each_other_take_no_longer_than_the_highest() {
     ];
     for (case, stack) in stacks.into_iter().enumerate() {
         let (found, apart) = certified(&exact([stack.clone(), ridge.clone()].concat()), &plan);
-        for (got, wanted) in [(found.above, wanted.above), (found.below, wanted.below)] {
+        for (got, expected) in [(found.above, expected.above), (found.below, expected.below)] {
             assert!(
-                (got.value_m - wanted.value_m).abs() < 1e-11,
-                "{case}: {found:?} {wanted:?}"
+                (got.value_m - expected.value_m).abs() < 1e-11,
+                "{case}: {found:?} {expected:?}"
             );
         }
         assert!(apart.unwrap().lower_m <= found.bound_m(), "{case}");

@@ -124,7 +124,7 @@ fn obj_faults_have_their_line() {
 
 #[test]
 fn obj_is_read_however_it_is_written() {
-    let wanted = [[[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.0, 0.25]]];
+    let expected = [[[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.0, 0.25]]];
     for text in [
         &b"v 0 0 0\nv 1.5 0 0\nv 0 1 .25\nf 1 2 3"[..],
         b"\xef\xbb\xbf# t\xeate\r\nv 0 0 0 1.0\r\nv 15e-1 0 0\r\nv 0 1 2.5e-001\r\nf 1/1 2//7 3/4/5\r\n",
@@ -134,7 +134,7 @@ fn obj_is_read_however_it_is_written() {
         b"# made in C: \\\nv 0 0 0\nv 1.5 0 0 # a \\\nv 0 1 0.25\nf 1 2 3\n",
     ] {
         let mesh = read(SurfaceFormat::Obj, text).unwrap();
-        assert_eq!(mesh.triangles, wanted, "{}", text.escape_ascii());
+        assert_eq!(mesh.triangles, expected, "{}", text.escape_ascii());
     }
     // A notched face is not filled.
     let notched = b"v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n";
@@ -521,7 +521,7 @@ fn a_3dxml_body_that_is_no_tessellation_is_refused() {
 #[test]
 fn a_coarser_version_in_3dxml_is_passed_over() {
     let [manifest, structure, representation] = fluxform_testing::surface_files::three_dxml_parts();
-    let wanted = read(SurfaceFormat::ThreeDxml, &three_dxml()).unwrap();
+    let expected = read(SurfaceFormat::ThreeDxml, &three_dxml()).unwrap();
     let end = "</VertexBuffer></Rep>";
     assert!(representation.1.contains(end));
     let coarser = "<PolygonalLOD accuracy=\"9\"><Faces><Face triangles=\"0 1 2\"/></Faces>\
@@ -535,7 +535,7 @@ fn a_coarser_version_in_3dxml_is_passed_over() {
         (representation.0, &text),
     ]);
     let found = read(SurfaceFormat::ThreeDxml, &bytes).unwrap();
-    assert_eq!(found.triangles, wanted.triangles);
+    assert_eq!(found.triangles, expected.triangles);
 }
 
 #[test]

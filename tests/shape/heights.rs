@@ -82,19 +82,19 @@ fn check(triangles: &[[[i64; 3]; 3]], from: i64, to: i64, step: i64, tolerance: 
     for (k, found) in heights.iter().enumerate() {
         let x = from + step * (k % samples) as i64;
         let y = from + step * (k / samples) as i64;
-        let wanted = brute_force(&solid, x, y).map(|(p, q)| p as f64 / q as f64);
-        match (found, wanted) {
-            (Some(found), Some(wanted)) => {
-                let error = (found.height_m - wanted).abs();
+        let expected = brute_force(&solid, x, y).map(|(p, q)| p as f64 / q as f64);
+        match (found, expected) {
+            (Some(found), Some(expected)) => {
+                let error = (found.height_m - expected).abs();
                 assert!(
                     error <= tolerance,
-                    "({x}, {y}): {} {wanted}",
+                    "({x}, {y}): {} {expected}",
                     found.height_m
                 );
                 covered += 1;
             }
             (None, None) => {}
-            _ => panic!("({x}, {y}): {found:?}, exactly {wanted:?}"),
+            _ => panic!("({x}, {y}): {found:?}, exactly {expected:?}"),
         }
     }
     covered
@@ -227,7 +227,7 @@ fn order_orientation_and_threads_leave_every_bit() {
     };
     let plans = [seed_plan(), grid((-0.04, 0.05, 101), (-0.0501, 0.043, 77))];
     for plan in plans {
-        let wanted = bits(&sample(&place(file.triangles.clone()), &plan));
+        let expected = bits(&sample(&place(file.triangles.clone()), &plan));
         let mut triangles = file.triangles.clone();
         for t in &mut triangles {
             let (a, b) = (random.below(3), random.below(3));
@@ -240,7 +240,7 @@ fn order_orientation_and_threads_leave_every_bit() {
         let again = triangles[..500].to_vec();
         triangles.extend(again);
         let mesh = place(triangles);
-        assert_eq!(bits(&sample(&mesh, &plan)), wanted);
+        assert_eq!(bits(&sample(&mesh, &plan)), expected);
         for threads in [1, 2, 3, 7] {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
@@ -248,7 +248,7 @@ fn order_orientation_and_threads_leave_every_bit() {
                 .unwrap();
             assert_eq!(
                 pool.install(|| bits(&sample(&mesh, &plan))),
-                wanted,
+                expected,
                 "{threads} threads"
             );
         }

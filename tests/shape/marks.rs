@@ -133,15 +133,15 @@ fn holes_are_reported_and_filled_only_on_request() {
     fill(&plan, &mut samples, &found);
     for &k in &found {
         let filled = samples[k].unwrap();
-        let wanted = z(plan.x_m.node(k % 25), plan.y_m.node(k / 25));
+        let expected = z(plan.x_m.node(k % 25), plan.y_m.node(k / 25));
         // A plane is harmonic.
         assert!(
-            (filled.height_m - wanted).abs() < 1e-11,
-            "{filled:?} {wanted}"
+            (filled.height_m - expected).abs() < 1e-11,
+            "{filled:?} {expected}"
         );
         let length = 1.05f64.sqrt();
-        for (got, wanted) in filled.normal.iter().zip([-0.2, 0.1, 1.0]) {
-            assert!((got - wanted / length).abs() < 1e-9, "{filled:?}");
+        for (got, expected) in filled.normal.iter().zip([-0.2, 0.1, 1.0]) {
+            assert!((got - expected / length).abs() < 1e-9, "{filled:?}");
         }
     }
     assert!(holes(&plan, &samples).is_empty());
@@ -182,9 +182,9 @@ fn random_holes_are_those_that_no_flood_reaches() {
             }
         }
         let dry = |k: &usize| samples[*k].is_none() && !wet[k / columns + 1][k % columns + 1];
-        let wanted: Vec<usize> = (0..samples.len()).filter(dry).collect();
-        assert_eq!(holes(&plan, &samples), wanted, "{columns} x {rows}");
-        reported += wanted.len();
+        let expected: Vec<usize> = (0..samples.len()).filter(dry).collect();
+        assert_eq!(holes(&plan, &samples), expected, "{columns} x {rows}");
+        reported += expected.len();
     }
     assert!(reported > 200, "{reported}");
 }
@@ -421,12 +421,15 @@ fn a_small_formula_is_found_in_a_wide_region() {
         side_m: 0.0019,
         height_m: 0.03,
     };
-    for (area_m2, wanted) in [
+    for (area_m2, expected) in [
         (at(ball, 0.0), PI * 0.0013 * 0.0013),
         (at(plate, 0.0), 0.0019 * 0.0019),
         (at(plate, 31.0), 0.0019 * 0.0019),
     ] {
-        assert!((area_m2 / wanted - 1.0).abs() < 0.1, "{area_m2} {wanted}");
+        assert!(
+            (area_m2 / expected - 1.0).abs() < 0.1,
+            "{area_m2} {expected}"
+        );
     }
 }
 

@@ -96,16 +96,16 @@ fn the_bodies_have_the_primitives_heights_and_borders() {
             &Silent,
         )
         .unwrap();
-        let wanted = if name == "half_sphere" { 2821 } else { 3721 };
+        let expected = if name == "half_sphere" { 2821 } else { 3721 };
         assert_eq!(
             (mesh.points.len(), mesh.points.outside),
-            (wanted, 3721 - wanted),
+            (expected, 3721 - expected),
             "{name}"
         );
         assert_eq!(mesh.points.grid_index, exact.points.grid_index, "{name}");
         assert!(mesh.warnings.is_empty() && mesh.mesh.unwrap().degenerate == 0);
         let mut worst = 0.0f64;
-        for row in 0..wanted {
+        for row in 0..expected {
             worst = worst.max(off(name, &mesh.points, row, exact.points.height_m[row]));
             let (n, e) = (mesh.points.normal[row], exact.points.normal[row]);
             // A facet's normal is off by the angle it spans.

@@ -33,16 +33,16 @@ fn real_files_match_a_search_through_all_triangles() {
         let mut hits = 0;
         for (k, found) in sample(&mesh, &plan).iter().enumerate() {
             let p = [plan.x_m.node(k % 41), plan.y_m.node(k / 41)];
-            let wanted = mesh
+            let expected = mesh
                 .triangles()
                 .iter()
                 .filter_map(|t| plane_height(t, p))
                 .fold(None, |m: Option<f64>, h| Some(m.map_or(h, |m| m.max(h))));
-            if let Some(wanted) = wanted {
+            if let Some(expected) = expected {
                 let height = found.unwrap().height_m;
                 assert!(
-                    (height - wanted).abs() < 1e-9,
-                    "{name} {p:?}: {height} {wanted}"
+                    (height - expected).abs() < 1e-9,
+                    "{name} {p:?}: {height} {expected}"
                 );
                 hits += 1;
             }

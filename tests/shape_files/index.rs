@@ -84,21 +84,21 @@ fn real_files_have_the_indexs_facts() {
             1.0
         };
         if !differs("volume") && report.watertight {
-            let (got, wanted) = (report.volume.unwrap() * unit * unit * unit, parse("volume"));
+            let (got, expected) = (report.volume.unwrap() * unit * unit * unit, parse("volume"));
             assert!(
-                (got - wanted).abs() < 1e-5 * wanted,
-                "{name}: {got} {wanted}"
+                (got - expected).abs() < 1e-5 * expected,
+                "{name}: {got} {expected}"
             );
         }
         if !differs("bounds") {
-            let wanted = entry["bounds_min_max"].split(' ');
-            let wanted: Vec<f64> = wanted.map(|c| c.parse().unwrap()).collect();
-            let size = wanted.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
-            for (k, wanted) in wanted.iter().enumerate() {
+            let expected = entry["bounds_min_max"].split(' ');
+            let expected: Vec<f64> = expected.map(|c| c.parse().unwrap()).collect();
+            let size = expected.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+            for (k, expected) in expected.iter().enumerate() {
                 let got = [report.bounds_min, report.bounds_max][k / 3][k % 3] * unit;
                 assert!(
-                    (got - wanted).abs() <= 1e-5 * size,
-                    "{name}: {got} {wanted}"
+                    (got - expected).abs() <= 1e-5 * size,
+                    "{name}: {got} {expected}"
                 );
             }
         }

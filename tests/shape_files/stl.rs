@@ -42,12 +42,12 @@ fn good_files_have_the_indexs_facts() {
                     / 6.0
             })
             .sum();
-        let wanted: f64 = cells[15].parse().unwrap();
+        let target: f64 = cells[15].parse().unwrap();
         // The index gives six digits; open bodies have no volume to compare.
         if cells[13] == "True" {
             assert!(
-                (volume - wanted).abs() <= 1e-5 * wanted.abs(),
-                "{name}: {volume} {wanted}"
+                (volume - target).abs() <= 1e-5 * target.abs(),
+                "{name}: {volume} {target}"
             );
         }
         let mesh = Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap();

@@ -56,7 +56,7 @@ pub struct BenchRequest {
 /// The stages that are measured.
 fn chosen(request: &BenchRequest) -> impl Iterator<Item = &'static Stage> {
     STAGES.iter().filter(|stage| {
-        request.stages.is_empty() || request.stages.iter().any(|wanted| wanted == stage.name)
+        request.stages.is_empty() || request.stages.iter().any(|expected| expected == stage.name)
     })
 }
 

@@ -232,8 +232,8 @@ impl Dir {
     /// # Errors
     /// [`io::ErrorKind::PermissionDenied`] or [`io::ErrorKind::ReadOnlyFilesystem`].
     pub fn writable(&self) -> io::Result<()> {
-        let wanted = Access::WRITE_OK | Access::EXEC_OK;
-        Ok(accessat(&self.fd, ".", wanted, AtFlags::EACCESS)?)
+        let requested = Access::WRITE_OK | Access::EXEC_OK;
+        Ok(accessat(&self.fd, ".", requested, AtFlags::EACCESS)?)
     }
 
     /// The regular file `name`, for reading; anything else, a link included, is an error.
@@ -409,8 +409,8 @@ impl Dir {
 #[cfg(target_os = "linux")]
 pub(super) fn identity(file: impl AsFd) -> Vec<u8> {
     use rustix::fs::{StatxFlags, statx};
-    let wanted = StatxFlags::INO | StatxFlags::BTIME;
-    let Ok(found) = statx(file, "", AtFlags::EMPTY_PATH, wanted) else {
+    let requested = StatxFlags::INO | StatxFlags::BTIME;
+    let Ok(found) = statx(file, "", AtFlags::EMPTY_PATH, requested) else {
         return Vec::new();
     };
     // Where a disk does not keep the time it is zero.

@@ -247,7 +247,7 @@ mod tests {
         std::fs::write(path("victim/a"), "a").unwrap();
         symlink(path("victim"), path(".fluxform-link.tmp")).unwrap();
         clean_leftovers(&dir);
-        let mut wanted = [
+        let mut requested = [
             ".fluxform-link.tmp",
             ".fluxform-mine.tmp",
             ".fluxform-ours.tmp",
@@ -255,9 +255,9 @@ mod tests {
         ]
         .map(OsString::from)
         .to_vec();
-        wanted.extend([held.name.clone().unwrap(), kept.name().to_owned()]);
-        wanted.sort();
-        assert_eq!(dir.names().unwrap(), wanted);
+        requested.extend([held.name.clone().unwrap(), kept.name().to_owned()]);
+        requested.sort();
+        assert_eq!(dir.names().unwrap(), requested);
         assert!(path("victim/a").is_file() && path(".fluxform-ours.tmp/a").is_file());
         drop((held, kept));
         assert_eq!(dir.names().unwrap().len(), 4);

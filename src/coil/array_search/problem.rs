@@ -24,10 +24,10 @@ pub enum Level {
     Full,
 }
 
-/// What is computed of a design.
+/// The computed properties of a design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Physical {
-    /// What is made large of every shape, above 0: its force constant, N/m, or the inverse of an error.
+    /// The merit of every shape, above 0: its force constant, N/m, or the inverse of an error.
     pub merits: Vec<f64>,
     /// Self inductance of a coil alone, H.
     pub inductance_h: f64,
@@ -78,7 +78,7 @@ impl Physical {
     }
 }
 
-/// What is made as large as possible, of the shapes' merits relative to the given design's.
+/// The objective, made of the shapes' merits relative to the given design's.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Objective {
     /// The smallest.
@@ -100,7 +100,7 @@ pub struct Bounded {
     pub limit: f64,
     /// Whether the value is to be above.
     pub at_least: bool,
-    /// What counts as large for the difference; `None`: it is relative.
+    /// Scale of the difference; `None`: it is relative.
     scale: Option<f64>,
 }
 
@@ -159,7 +159,7 @@ impl Bounded {
 
 /// Relative rounding of places and lengths, several operations long.
 const ROUNDING: f64 = 1e-12;
-/// What the search stays below limits that are not whole lengths of wire: lengths are rounded later.
+/// Distance that the search keeps from limits that are not whole lengths of wire: lengths are rounded later.
 const MARGIN: f64 = 3e-5;
 /// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
 const LEAST_CORE_MM: f64 = 1.0;
@@ -187,7 +187,7 @@ pub struct ArrayProblem<'a> {
     /// Limits that are no part of the search, by key: those of the coil that all designs of the space meet or
     /// break alike.
     left_out: Vec<&'static str>,
-    /// What full accuracy adds to the outputs of the search.
+    /// The correction of the search's outputs to full accuracy.
     correction: RwLock<Vec<f64>>,
 }
 
@@ -268,7 +268,7 @@ impl<'a> ArrayProblem<'a> {
         Ok(full)
     }
 
-    /// What is computed of the design as it is made.
+    /// The computed properties of the design as it is made.
     ///
     /// # Errors
     /// Interruption.
@@ -282,7 +282,7 @@ impl<'a> ArrayProblem<'a> {
             .compute(&design, self.space.raised_m(&made), level)
     }
 
-    /// What the corrected outputs stand for.
+    /// The properties that the corrected outputs stand for.
     #[must_use]
     pub fn estimate(&self, outputs: &[f64]) -> Option<Physical> {
         Physical::of_outputs(&self.corrected(outputs), self.reference_ln.len())
@@ -368,7 +368,7 @@ impl<'a> ArrayProblem<'a> {
         of_design.filter(|bound| bound.value.is_finite()).collect()
     }
 
-    /// What decides whether the winding can be made and the coils stand beside each other.
+    /// Bounds under which the winding can be made and the coils fit beside each other.
     fn add_winding(&self, design: &Design, all: &mut Vec<Bounded>) {
         let Some(coil) = &design.coil else { return };
         if design.array.positions_m.len() > 1 {
@@ -399,7 +399,7 @@ impl<'a> ArrayProblem<'a> {
         }
     }
 
-    /// What leaves a core, below the shapes.
+    /// Bounds under which a core remains, below the shapes.
     fn add_core(&self, x: &[f64], design: &Design, all: &mut Vec<Bounded>) {
         let (Some(coil), Some(core)) = (&design.coil, &design.core) else {
             return;
@@ -419,7 +419,7 @@ impl<'a> ArrayProblem<'a> {
         }));
     }
 
-    /// What leaves raised shapes in the workspace, where a runtime gives forces.
+    /// The bound that leaves raised shapes in the workspace, where a runtime gives forces.
     fn add_height(&self, x: &[f64], all: &mut Vec<Bounded>) {
         let Some(height_mm) = self.space.value(x, Axis::Height) else {
             return;
@@ -438,7 +438,7 @@ impl<'a> ArrayProblem<'a> {
     /// By how much a search must stay below a limit, or above it.
     fn margin(&self, bound: &Bounded) -> f64 {
         match bound.name {
-            // What is not wound is not rounded, and may be at its limit as given.
+            // A length that is not wound is not rounded, and may be at its limit as given.
             _ if !self.space.is_wound() && !self.space.varies_plate() => MET,
             // Whole wires meet it exactly.
             Some(LimitName::Length) => -ROUNDING,
@@ -470,7 +470,7 @@ impl<'a> ArrayProblem<'a> {
     }
 }
 
-/// What keeps all feet on the plate.
+/// Bounds that keep all feet on the plate.
 fn add_plate(design: &Design, all: &mut Vec<Bounded>) {
     const KEYS: [&str; 3] = ["plate_x_m", "plate_y_m", "plate_diameter_m"];
     if let Some(plate) = &design.plate {

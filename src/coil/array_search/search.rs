@@ -12,10 +12,10 @@ use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics,
 use super::space::{Choice, Space, choices};
 use crate::limits::LimitName;
 
-/// What is searched, and how.
+/// The settings of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// What is made as large as possible.
+    /// The objective.
     pub objective: Objective,
     /// Evaluations, starts and seed.
     pub settings: Settings,
@@ -55,7 +55,7 @@ pub enum Refused {
 pub struct Candidate {
     /// Its variables, as made.
     pub x: Vec<f64>,
-    /// What was computed.
+    /// The computed arrays.
     pub physical: Physical,
     /// Its limits.
     pub bounds: Vec<Bounded>,
@@ -125,7 +125,7 @@ impl SearchedChoice {
 pub struct Found<'a> {
     /// The problem of the best choice.
     pub problem: &'a ArrayProblem<'a>,
-    /// What was learned about it.
+    /// The search over it.
     pub search: Search<'a>,
     /// The best design.
     pub best: Candidate,

@@ -132,7 +132,7 @@ pub struct Space {
     variables: Vec<Variable>,
     /// Layers and turns are whole numbers of wires; otherwise the coil is as given.
     wound: bool,
-    /// What layers and turns may amount to, mm.
+    /// Ranges of the length and outer diameter that layers and turns give, mm.
     pub(super) outer_mm: [f64; 2],
     pub(super) length_mm: [f64; 2],
     bore_mm: f64,

@@ -1,4 +1,4 @@
-//! What surrounds the best array: what limits are worth, what each variable bought, how far each may
+//! The surroundings of the best array: the worth of limits, the gain from each variable, how far each may
 //! move, designs that are easier to make, and what the objective costs in mass, heat and time.
 
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ pub struct LimitWorth {
     pub name: Option<LimitName>,
 }
 
-/// What a variable bought, and how far it may move.
+/// The gain from a variable, and how far it may move.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VariableStudy {
     /// Its key.
@@ -115,7 +115,7 @@ pub struct TradedDesign {
     values: BTreeMap<String, f64>,
 }
 
-/// What the objective may lose within a range.
+/// Loss of the objective that a range allows.
 const LOSS: f64 = 0.01;
 /// Weight of a range's width: limits' multipliers stay below the penalty for variables this flat.
 const FLATTEST: f64 = 0.02;

@@ -173,15 +173,15 @@ fn meets_the_reference_optima() {
     let text = include_str!("../../../tests/oracles/nlopt/reference.json");
     let reference: serde_json::Value = serde_json::from_str(text).expect("JSON");
     for name in ["seed_cored", "cored_mass", "cored_wire_choices"] {
-        let wanted = &reference["problems"][name];
+        let expected = &reference["problems"][name];
         let path = folder.join(format!("designs/{name}.toml"));
         let (design, _) = Design::read(&path, NOTHING).expect("a good design");
         let task = task::of_design(&design, Fixed::default()).expect("a task");
         let model = task::coil_model(&design, &magnet()).expect("a model");
         let outcome = optimise(&*model, &task, &quick(), &Silent).expect("not interrupted");
         let best = outcome.best.expect("an optimum");
-        let force_n = wanted["best"]["force_n"].as_f64().expect("a number");
-        let tolerance = wanted["objective_tolerance"].as_f64().expect("a number");
+        let force_n = expected["best"]["force_n"].as_f64().expect("a number");
+        let tolerance = expected["objective_tolerance"].as_f64().expect("a number");
         let over = best.force_n / force_n - 1.0;
         assert!(over.abs() < tolerance, "{name}: {over:e}");
         for limit in &best.limits {
@@ -192,7 +192,7 @@ fn meets_the_reference_optima() {
             };
             assert!(worse <= 1.0 + 1e-9, "{name}: {limit:?}");
             let key = limit.name.key();
-            let reported = &wanted["active"][key]["sensitivity_n_per_unit"];
+            let reported = &expected["active"][key]["sensitivity_n_per_unit"];
             if let (true, Some(reported)) = (limit.active, reported.as_f64()) {
                 let ratio = limit.sensitivity_n_per_unit / reported;
                 assert!((ratio - 1.0).abs() < 2e-3, "{name} {key}: {ratio}");

@@ -615,14 +615,14 @@ mod tests {
         let s = a.hypot(z);
         let inner = 1.5 * thin * thin * a * z * (2.0 * z * z - 3.0 * a * a) / s.powi(7);
         let length = 1.5 * thin * a * a * z / s.powi(5);
-        for (slope, wanted) in [(slopes[0], inner), (slopes[2], length)] {
+        for (slope, requested) in [(slopes[0], inner), (slopes[2], length)] {
             assert!(
-                (slope.lo - wanted).abs() < 1e-7 * wanted.abs(),
-                "{slope:?} {wanted}"
+                (slope.lo - requested).abs() < 1e-7 * requested.abs(),
+                "{slope:?} {requested}"
             );
             assert!(
-                (slope.hi - wanted).abs() < 1e-7 * wanted.abs(),
-                "{slope:?} {wanted}"
+                (slope.hi - requested).abs() < 1e-7 * requested.abs(),
+                "{slope:?} {requested}"
             );
         }
     }

@@ -330,10 +330,10 @@ mod tests {
             let [f, g, h] = cells.at([x, y, z], line).expect("defined");
             let (s, c) = (0.7 * x - y).sin_cos();
             let e = (1.3 * z).exp();
-            let wanted = [s * e, 0.7 * c * e, -c * e, 1.3 * s * e];
+            let requested = [s * e, 0.7 * c * e, -c * e, 1.3 * s * e];
             let got = [f.value, f.slope[0], f.slope[1], f.slope[2]];
-            for (a, b) in got.iter().zip(wanted) {
-                assert!((a - b).abs() < 2e-9, "{got:?} {wanted:?}");
+            for (a, b) in got.iter().zip(requested) {
+                assert!((a - b).abs() < 2e-9, "{got:?} {requested:?}");
             }
             assert!((g.value - 1.0 / (3.0 + x + y * z)).abs() < 1e-9);
             assert!((h.value - 0.7 * x).abs() < 1e-12 && (h.slope[0] - 0.7).abs() < 1e-11);

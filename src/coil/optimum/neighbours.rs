@@ -134,9 +134,9 @@ mod tests {
             .factors(&alone, 1000.0, &[(0.03, -0.9)], 0.014_501_9)
             .expect("cores apart");
         // Finite elements and a modal prototype: gradient and inductance of the centre coil.
-        let wanted = [0.4719 / 0.428_229, 0.2129 / 0.184_092];
-        for (factor, wanted) in factors.iter().zip(wanted) {
-            assert!((factor / wanted - 1.0).abs() < 2e-3, "{factors:?}");
+        let requested = [0.4719 / 0.428_229, 0.2129 / 0.184_092];
+        for (factor, requested) in factors.iter().zip(requested) {
+            assert!((factor / requested - 1.0).abs() < 2e-3, "{factors:?}");
         }
         assert_eq!(Neighbours::new(&positions_m[..1]), None);
     }

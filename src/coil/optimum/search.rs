@@ -514,14 +514,14 @@ mod tests {
             ..quick()
         };
         let [coarse, exact] = [Known::Nothing, Known::All].map(|known| Bent(air(HEIGHT_M), known));
-        let Ok(wanted) = solve_all(&exact, &task, &settings, &Silent).expect("runs") else {
+        let Ok(requested) = solve_all(&exact, &task, &settings, &Silent).expect("runs") else {
             panic!("bounded");
         };
         let Ok(found) = solve_all(&coarse, &task, &settings, &Silent).expect("runs") else {
             panic!("bounded");
         };
-        let wanted = best_x(&wanted).expect("an optimum");
-        let away = |x: [f64; 3]| (0..3).fold(0.0_f64, |s, i| s.max((x[i] - wanted[i]).abs()));
+        let requested = best_x(&requested).expect("an optimum");
+        let away = |x: [f64; 3]| (0..3).fold(0.0_f64, |s, i| s.max((x[i] - requested[i]).abs()));
         let before = away(best_x(&found).expect("an optimum"));
         assert!(before > 0.01, "{before:e}");
         let sharp = sharpened(&coarse, &task, &found, &Silent).expect("runs");

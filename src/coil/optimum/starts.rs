@@ -89,8 +89,8 @@ mod tests {
             let share = |index: usize| (starts[index][axis] - lo) / (hi - lo);
             for index in 1..5 {
                 let moved = share(index) - share(0);
-                let wanted = points[index] - points[0];
-                let turns = moved - wanted;
+                let requested = points[index] - points[0];
+                let turns = moved - requested;
                 assert!(
                     (turns - turns.round()).abs() < 1e-12,
                     "{axis} {index}: {moved}"

@@ -10,7 +10,7 @@ use crate::commands::calibrate::needed_coils;
 use crate::commands::calibrate::needed_nodes;
 use crate::commands::discretize::scattered;
 use crate::commands::discretize::{self, PointsReport};
-use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_at};
+use crate::commands::lambda::{ForcePoints, LambdaOptions, resolving, solve_at};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
@@ -112,12 +112,12 @@ impl<'a> Bench<'a> {
         document: &ShapeDocument,
         points: Points,
         progress: &dyn Progress,
-    ) -> Result<WantedPoints, RunError> {
+    ) -> Result<ForcePoints, RunError> {
         match points {
             Points::Grid(samples) => {
                 let document = document.with_samples(samples);
                 let report = discretize::run(&document, Vec::new(), progress)?;
-                Ok(WantedPoints::of_object(
+                Ok(ForcePoints::of_object(
                     &report,
                     self.request.lambda.weights_of(&report),
                     &self.scene.design.workspace,
@@ -134,7 +134,7 @@ impl<'a> Bench<'a> {
                 };
                 let how = resolving(asked, lowest_m);
                 let report = scattered::run(document, Vec::new(), how, progress)?;
-                Ok(WantedPoints::of_scattered(&report))
+                Ok(ForcePoints::of_scattered(&report))
             }
         }
     }
@@ -144,7 +144,7 @@ impl<'a> Bench<'a> {
         &self,
         shape: &ShapeSource,
         ladders: &Ladders,
-    ) -> Result<Vec<(WantedPoints, f64)>, RunError> {
+    ) -> Result<Vec<(ForcePoints, f64)>, RunError> {
         let rungs = ladders.points.iter();
         rungs
             .map(|rung| self.timed(|within| self.points(&shape.document, rung.points, within)))
@@ -155,7 +155,7 @@ impl<'a> Bench<'a> {
     pub fn lambda(
         &self,
         solved: &BothSolved,
-        points: &WantedPoints,
+        points: &ForcePoints,
     ) -> Result<(LambdaFile, f64), RunError> {
         let options = LambdaOptions {
             tolerance: Some(solved.forces.tolerance),
@@ -204,7 +204,7 @@ impl<'a> Bench<'a> {
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
         let (_, lambda_s) = self.lambda(
             &solved,
-            &WantedPoints::of_object(
+            &ForcePoints::of_object(
                 &report,
                 self.request.lambda.weights_of(&report),
                 &self.scene.design.workspace,

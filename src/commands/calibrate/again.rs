@@ -63,15 +63,15 @@ pub fn expected(
     let object = calibration.points(progress)?;
     let seal = |content: &BundleContent, _: &LambdaReport| Ok(sealed_manifest(content)?);
     let (manifest, lambda) = calibration.compute(&object, progress, seal)?;
-    let wanted = object.wanted(&calibration);
+    let forces = object.force_points(&calibration);
     let named = scene.files.iter().map(|file| file.kept_name.clone());
     Ok(Expected {
         manifest,
         copies: std::iter::once(DESIGN_FILE.to_owned())
             .chain(named)
             .collect(),
-        weights: wanted.weights().map(<[f64]>::to_vec),
-        points: wanted.rows(),
+        weights: forces.weights().map(<[f64]>::to_vec),
+        points: forces.rows(),
         lambda: lambda.file,
     })
 }

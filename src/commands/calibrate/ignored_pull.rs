@@ -2,7 +2,7 @@
 
 use crate::RunError;
 use crate::bundle::manifest::LeftOut;
-use crate::commands::lambda::{LambdaReport, WantedPoints};
+use crate::commands::lambda::{ForcePoints, LambdaReport};
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::coupled;
@@ -48,7 +48,7 @@ impl IgnoredPull {
     pub(crate) fn new(
         scene: &Scene,
         lambda: &LambdaReport,
-        points: &WantedPoints,
+        points: &ForcePoints,
         field: ShapeField,
     ) -> Result<Option<Self>, RunError> {
         if scene.design.magnet.passive_force || scene.steel_extent_m().is_none() {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::discretize::{self, OpenedSurface, PointsReport, point_rows, points_grid};
 use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::placement::Placed;
-use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
+use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
 use crate::RunError;
@@ -397,9 +397,9 @@ struct ObjectPoints {
 
 impl ObjectPoints {
     /// The points that the force constant of `of` is solved for.
-    fn wanted(&self, of: &Calibration) -> WantedPoints {
+    fn force_points(&self, of: &Calibration) -> ForcePoints {
         let rule = of.options.lambda.weights_of(&self.found);
-        WantedPoints::of_object(&self.found, rule, &of.scene.design.workspace)
+        ForcePoints::of_object(&self.found, rule, &of.scene.design.workspace)
     }
 }
 
@@ -489,7 +489,7 @@ impl Calibration<'_> {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = object.wanted(self);
+        let of_grid = object.force_points(self);
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,

@@ -414,8 +414,8 @@ impl Object {
                         .map(|part| rendered.lambda_n_per_m * part);
                     let wanted_n = wanted_n - passive_n;
                     let reach = if other.direction.is_some() {
-                        let wanted = [x, y, wanted_n];
-                        allocators.vector.allocate(row, wanted, &mut currents).reach
+                        let target = [x, y, wanted_n];
+                        allocators.vector.allocate(row, target, &mut currents).reach
                     } else {
                         for (upward, force) in upward.iter_mut().zip(row) {
                             *upward = force[2];

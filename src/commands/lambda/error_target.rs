@@ -4,7 +4,7 @@ pub use crate::scene::tolerances::ErrorTarget;
 
 use super::LambdaOptions;
 use super::LambdaReport;
-use super::points::{ForcesAt, WantedPoints};
+use super::points::{ForcePoints, ForcesAt};
 use crate::RunError;
 use crate::bundle::headline::{RequestedError, RunAtError};
 use crate::commands::discretize::fewest_points::{SMOOTH, fewest_points};
@@ -102,7 +102,7 @@ impl Trial<'_> {
             ..PointsOptions::default()
         };
         let report = opened.discretize(document, &heights_alone, None, progress)?;
-        let points = WantedPoints::of_object(
+        let points = ForcePoints::of_object(
             &report,
             options.weights_of(&report),
             &scene.design.workspace,

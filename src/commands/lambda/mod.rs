@@ -27,7 +27,7 @@ use self::error_target::{ChosenGrid, ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 use self::placement::Placed;
-pub(crate) use self::points::{ForcesAt, WantedPoints};
+pub(crate) use self::points::{ForcePoints, ForcesAt};
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
 use super::discretize::{OpenedSurface, PointsOptions, PointsReport};
@@ -234,15 +234,15 @@ pub fn run(
         .map_or(document, |(_, chosen)| &chosen.document);
     let options = &options.over(document);
     let points = opened.discretize(document, &PointsOptions::default(), None, progress)?;
-    let of_grid = WantedPoints::of_object(&points, options.weights_of(&points), &design.workspace);
+    let of_grid = ForcePoints::of_object(&points, options.weights_of(&points), &design.workspace);
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
     let sample = |how| scattered::run(document, inputs.clone(), how, progress);
     let sampled = sampling.map(sample).transpose()?;
-    let chosen = sampled.as_ref().map(WantedPoints::of_scattered);
+    let chosen = sampled.as_ref().map(ForcePoints::of_scattered);
     let coarser = sampling.and_then(coarser).map(sample).transpose()?;
-    let coarser = coarser.as_ref().map(WantedPoints::of_scattered);
+    let coarser = coarser.as_ref().map(ForcePoints::of_scattered);
     // The steel is solved once, for the lowest of all places.
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
     let lowest = of_all.into_iter().flatten();
@@ -255,10 +255,10 @@ pub fn run(
     let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
     let none = ShapeField::default();
-    let solve_with = |points: &WantedPoints, options: &LambdaOptions| {
+    let solve_with = |points: &ForcePoints, options: &LambdaOptions| {
         solve_at(&scene, &solved, none, points, options, progress)
     };
-    let whole = |points: &WantedPoints| -> Result<LambdaReport, RunError> {
+    let whole = |points: &ForcePoints| -> Result<LambdaReport, RunError> {
         let mut report = solve_with(points, options)?;
         sideways::add(
             &mut report.file,
@@ -387,7 +387,7 @@ struct PosedProblem<'a> {
     scene: &'a Scene<'a>,
     solved: &'a Solved,
     field: ShapeField<'a>,
-    points: &'a WantedPoints,
+    points: &'a ForcePoints,
     options: &'a LambdaOptions,
     /// Every coil by itself.
     unwired: ForceProblem<'a>,
@@ -405,7 +405,7 @@ pub(crate) fn solve_at(
     scene: &Scene,
     solved: &Solved,
     field: ShapeField,
-    points: &WantedPoints,
+    points: &ForcePoints,
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<LambdaReport, RunError> {

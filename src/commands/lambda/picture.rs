@@ -59,10 +59,10 @@ impl PosedProblem<'_> {
         let rms_height_m = rms_height_m(&self.problem);
         let rms_error_n: Vec<f64> = lambdas.iter().map(|l| path.error_n2(*l).sqrt()).collect();
         let relative = |(lambda, error): (&f64, &f64)| {
-            let wanted = lambda * rms_height_m;
+            let requested = lambda * rms_height_m;
             // More than the whole force is no rendering: the axis is for the rest.
-            (wanted > 0.0)
-                .then(|| error / wanted)
+            (requested > 0.0)
+                .then(|| error / requested)
                 .filter(|part| *part <= 1.0)
         };
         let currents = |lambda: &f64| {
@@ -102,7 +102,7 @@ impl PosedProblem<'_> {
             .collect();
         let errors = static_n.iter().zip(&requested_n);
         let errors_mn: Vec<f64> = errors
-            .map(|(given, wanted)| (given - wanted) * 1e3)
+            .map(|(given, requested)| (given - requested) * 1e3)
             .collect();
         let map = match &self.points.grid {
             Some(grid) => {

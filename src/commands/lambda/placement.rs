@@ -1,6 +1,6 @@
 //! Whether an object lies where the array can render it, and what would bring it there.
 
-use super::{LambdaReport, WantedPoints};
+use super::{ForcePoints, LambdaReport};
 use crate::design::Design;
 use crate::numerics::axis::Axis;
 use crate::shape::document::{ShapeDocument, SurfaceSource, parse_unit, unit_name, unit_names};
@@ -18,7 +18,7 @@ const OUT_OF_PROPORTION: f64 = 8.0;
 pub(crate) struct Placed<'a> {
     pub(crate) design: &'a Design,
     pub(crate) document: &'a ShapeDocument,
-    pub(crate) points: &'a WantedPoints,
+    pub(crate) points: &'a ForcePoints,
 }
 
 /// Report on the points outside the workspace.

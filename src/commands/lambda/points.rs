@@ -22,8 +22,8 @@ use crate::shape::point_areas::FineCells;
 
 /// Places, what is requested there, and what is known of their error.
 #[derive(Debug, Clone)]
-pub(crate) struct WantedPoints {
-    /// Where the magnet's centre is wanted, m.
+pub(crate) struct ForcePoints {
+    /// Where the magnet's centre is requested, m.
     pub(crate) positions_m: Vec<[f64; 3]>,
     /// z of each, m.
     pub(crate) height_m: Vec<f64>,
@@ -76,7 +76,7 @@ pub(crate) struct ForcesAt<'a> {
 /// The least that a point counts for, of the most.
 const LEAST: f64 = 1e-6;
 
-impl WantedPoints {
+impl ForcePoints {
     /// Those of a grid, which count by `rule`. Where they count by area and nobody gave the grid, samples of the
     /// cells that they describe badly are points too, after those of the grid, none below `workspace` or the
     /// lowest point of the grid.

@@ -15,7 +15,7 @@ use crate::scene::cached_field::ShapeField;
 use crate::scene::passive;
 use crate::scene::steel::Solved;
 
-use super::points::WantedPoints;
+use super::points::ForcePoints;
 use super::{LambdaOptions, uncertain};
 
 /// Points looked at, at most: means and medians of a force that changes over centimetres.
@@ -30,7 +30,7 @@ pub(crate) fn add(
     scene: &Scene,
     solved: &Solved,
     field: ShapeField,
-    points: &WantedPoints,
+    points: &ForcePoints,
     (options, force): (&LambdaOptions, RequestedForce),
     progress: &dyn Progress,
 ) -> Result<(), RunError> {

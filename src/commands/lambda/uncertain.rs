@@ -14,7 +14,7 @@ use crate::scene::steel::Solved;
 use crate::uncertainty::Uncertainty;
 
 use super::LambdaOptions;
-use super::points::WantedPoints;
+use super::points::ForcePoints;
 
 /// Random displays.
 const DRAWS: usize = 1000;
@@ -27,7 +27,7 @@ pub(crate) fn add(
     file: &mut LambdaFile,
     scene: &Scene,
     solved: &Solved,
-    points: &WantedPoints,
+    points: &ForcePoints,
     (options, force): (&LambdaOptions, RequestedForce),
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
@@ -111,7 +111,7 @@ impl Chosen {
     ///
     /// # Errors
     /// Bounds within which the magnet may touch the array.
-    fn new(scene: &Scene, points: &WantedPoints, given: &Uncertainty) -> Result<Self, RunError> {
+    fn new(scene: &Scene, points: &ForcePoints, given: &Uncertainty) -> Result<Self, RunError> {
         let every = points
             .height_m
             .len()
@@ -129,7 +129,7 @@ impl Chosen {
         Ok(chosen)
     }
 
-    fn directions(&self, points: &WantedPoints, force: RequestedForce) -> Vec<[f64; 3]> {
+    fn directions(&self, points: &ForcePoints, force: RequestedForce) -> Vec<[f64; 3]> {
         let all = points.directions(force);
         self.rows.iter().map(|row| all[*row]).collect()
     }

@@ -1,7 +1,7 @@
 //! Warnings about a force constant: why there is none, why it is zero, where it is not felt.
 
 use super::PosedProblem;
-use super::points::WantedPoints;
+use super::points::ForcePoints;
 use crate::lambda::feedback::reachable;
 use crate::lambda::worst::WorstSolution;
 use crate::lambda::{ForceProblem, Solution, Status};
@@ -89,7 +89,7 @@ fn of_status(status: Status) -> Option<&'static str> {
 }
 
 /// A point's number and place.
-fn place(points: &WantedPoints, point: usize) -> String {
+fn place(points: &ForcePoints, point: usize) -> String {
     let [x, y, z] = points.positions_m[point].map(|v| v * 1e3);
     format!("point {point} (x {x:.4}, y {y:.4}, z {z:.4} mm)")
 }
@@ -101,7 +101,7 @@ fn weakest(problem: &ForceProblem) -> Option<(usize, f64)> {
 }
 
 /// Why maxmin is null although forces can be rendered.
-fn no_maxmin(points: &WantedPoints, problem: &ForceProblem) -> String {
+fn no_maxmin(points: &ForcePoints, problem: &ForceProblem) -> String {
     if problem.height_m.iter().all(|&h| h <= 0.0) {
         return "no height is above zero, so no point can be too weak: lambda is null by the \
                 criterion maxmin"
@@ -121,7 +121,7 @@ fn no_maxmin(points: &WantedPoints, problem: &ForceProblem) -> String {
 }
 
 /// Why no lambda above zero leaves every point strong enough.
-fn maxmin_is_zero(points: &WantedPoints, problem: &ForceProblem, deciding: &[usize]) -> String {
+fn maxmin_is_zero(points: &ForcePoints, problem: &ForceProblem, deciding: &[usize]) -> String {
     let height = |point: usize| problem.height_m[point];
     match weakest(problem) {
         Some((point, most_n)) if most_n <= 0.0 && height(point) > 0.0 => format!(

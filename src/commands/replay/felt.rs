@@ -83,9 +83,9 @@ impl Felt {
         step: &Step,
         robust_a: &[f64],
     ) {
-        let wanted = step.wanted_force_n();
+        let requested = step.wanted_force_n();
         self.positions += 1;
-        self.requested_n2 += wanted.iter().map(|part| part * part).sum::<f64>();
+        self.requested_n2 += requested.iter().map(|part| part * part).sum::<f64>();
         let both = [renderer.plain_a(), robust_a];
         for (sums, currents) in self.sums.iter_mut().zip(both) {
             sums[0] += renderer.expected_n2(currents).unwrap_or(0.0);
@@ -114,7 +114,7 @@ impl Felt {
             }
             for (sums, currents) in self.sums.iter_mut().zip(both) {
                 let force = draw.force_n(&self.field, pull_n.unwrap_or(0.0), currents);
-                let parts = force.iter().zip(&wanted);
+                let parts = force.iter().zip(&requested);
                 sums[1] += parts.map(|(f, w)| (f - w) * (f - w)).sum::<f64>() / self.each as f64;
             }
         }

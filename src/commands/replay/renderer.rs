@@ -354,7 +354,7 @@ impl Renderer {
         let Some(part) = &mut self.robust else { return };
         let currents = &mut currents_a[..part.plain_a.len()];
         part.plain_a.copy_from_slice(currents);
-        let wanted = step.wanted_force_n();
+        let target = step.wanted_force_n();
         let axes = if step.sideways.is_some() { 0..3 } else { 2..3 };
         part.form.clear();
         let setting = *part.form.setting();
@@ -375,7 +375,7 @@ impl Renderer {
                     0.0
                 };
                 part.form
-                    .add(&part.row_n_per_a, wanted[axis] - pull_n, weight);
+                    .add(&part.row_n_per_a, target[axis] - pull_n, weight);
             }
         }
         part.form.minimise(&part.limits.problem(), currents);
@@ -483,12 +483,12 @@ impl Renderer {
             if step.answer == Answer::Outside {
                 continue;
             }
-            let wanted = step.wanted_force_n();
+            let target = step.wanted_force_n();
             let error_n = length(std::array::from_fn(|axis| {
                 if axis < first_axis {
                     0.0
                 } else {
-                    wanted[axis] - force[axis]
+                    target[axis] - force[axis]
                 }
             }));
             step.answer = if error_n <= tolerated_n {

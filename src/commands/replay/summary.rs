@@ -130,7 +130,7 @@ pub struct VectorErrors {
 pub struct ErrorSummary {
     /// Root mean square, N.
     pub rms_error_n: f64,
-    /// The same over the requested force's root mean square; null where none is wanted.
+    /// The same over the requested force's root mean square; null where none is requested.
     pub relative_rms_error: Option<f64>,
     /// Largest size, N.
     pub worst_error_n: f64,

@@ -179,11 +179,11 @@ fn sampled_forces(
     let largest = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let moment = route.scene.moment_a_m2;
     let places = spread(forces.len(), route.samples());
-    let wanted: Vec<(usize, [f64; 3])> = places
+    let requested: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| (index % coils, positions[index / coils]))
         .collect();
-    let exact = route.gradients(&wanted)?;
+    let exact = route.gradients(&requested)?;
     let worst = places
         .iter()
         .zip(&exact)

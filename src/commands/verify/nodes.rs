@@ -46,7 +46,7 @@ pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<
     let map = &bundle.map;
     let [coils, nz, ny, nx] = map.shape();
     let places = spread(coils * nz * ny * nx, route.samples());
-    let wanted: Vec<(usize, [f64; 3])> = places
+    let requested: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| {
             let (x, y, z) = (index % nx, index / nx % ny, index / (nx * ny) % nz);
@@ -54,7 +54,7 @@ pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<
             (coil, [map.x_m[x], map.y_m[y], map.z_m[z]])
         })
         .collect();
-    let exact = route.gradients(&wanted)?;
+    let exact = route.gradients(&requested)?;
     // Errors of nodes are relative to the whole gradient, of which dB_z/dz is the largest part.
     let sizes: Vec<f64> = (0..nz)
         .map(|level| largest_in_plane(bundle, &map.gz_t_per_m_per_a, level))
@@ -106,11 +106,11 @@ pub(super) fn between(
                 (k, place, point)
             })
             .collect();
-    let wanted: Vec<(usize, [f64; 3])> = places
+    let requested: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|(_, place, point)| (map.coil[*place] as usize, *point))
         .collect();
-    let exact = route.gradients(&wanted)?;
+    let exact = route.gradients(&requested)?;
     let checks = held(bundle).into_iter().map(|([_, name], part, values)| {
         let sizes: Vec<f64> = (0..nz)
             .map(|level| largest_in_plane(bundle, values, level))

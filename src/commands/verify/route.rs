@@ -52,12 +52,12 @@ impl<'a> Route<'a> {
     /// applied; for every (coil, point).
     pub(super) fn gradients(
         &self,
-        wanted: &[(usize, [f64; 3])],
+        requested: &[(usize, [f64; 3])],
     ) -> Result<Vec<[f64; 3]>, RunError> {
-        let centres: Vec<[f64; 3]> = wanted.iter().map(|(_, point)| *point).collect();
+        let centres: Vec<[f64; 3]> = requested.iter().map(|(_, point)| *point).collect();
         let moment = self.scene.moment_a_m2;
         let square: f64 = moment.iter().map(|m| m * m).sum();
-        let mut out = vec![[0.0; 3]; wanted.len()];
+        let mut out = vec![[0.0; 3]; requested.len()];
         let sources = self.solved.sources(
             self.scene,
             &centres,
@@ -84,11 +84,11 @@ impl<'a> Route<'a> {
                 None => Vec::new(),
             };
             out.par_iter_mut().enumerate().for_each(|(row, sums)| {
-                let (coil, place) = (&self.scene.coils[wanted[row].0], places[row]);
+                let (coil, place) = (&self.scene.coils[requested[row].0], places[row]);
                 let (dx, dy) = (place[0] - coil.axis_m[0], place[1] - coil.axis_m[1]);
                 let (zz, rz_over_r) = of_winding(self.scene, dx.hypot(dy), place[2]);
                 let part = |component: usize| {
-                    let block = wanted[row].0 * Components::Gradient.count() + component;
+                    let block = requested[row].0 * Components::Gradient.count() + component;
                     steel
                         .get(block * places.len() + row)
                         .copied()

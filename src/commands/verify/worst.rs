@@ -43,7 +43,7 @@ pub(super) fn checks(
         return Ok(checks);
     };
     let heights = problem.height_m.iter();
-    let wanted = lambda * heights.fold(0.0_f64, |most, h| most.max(h.abs()));
+    let requested = lambda * heights.fold(0.0_f64, |most, h| most.max(h.abs()));
     let coils = problem.coils();
     let points = problem.points();
     if currents.len() != coils || active.iter().any(|active| active.point >= points) {
@@ -60,7 +60,7 @@ pub(super) fn checks(
     let how = "the largest error of the worst-point currents over all points";
     checks.push(check(
         "worst-point error",
-        ratio((error - largest).abs(), wanted),
+        ratio((error - largest).abs(), requested),
         agrees,
         how.to_owned(),
     ));
@@ -68,7 +68,7 @@ pub(super) fn checks(
     let how = "proof of optimality from the points that decide";
     checks.push(check(
         "worst-point gap",
-        ratio(gap.max(0.0), wanted),
+        ratio(gap.max(0.0), requested),
         agrees,
         how.to_owned(),
     ));

@@ -117,10 +117,10 @@ impl IronArray {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<Self, Unsolved> {
-        let wanted = coarsest(tolerance);
+        let requested = coarsest(tolerance);
         let last = finest(iron)?;
         // The error is the difference of two.
-        let first = wanted.min(last - 1);
+        let first = requested.min(last - 1);
         let mut coarse = Self::at_resolution(coils, iron, tolerance, first)?;
         for tier in first + 1..=last {
             let mut fine = Self::at_resolution(coils, iron, tolerance, tier)?;

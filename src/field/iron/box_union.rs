@@ -64,7 +64,7 @@ pub fn contact(a: &Body, b: &Body) -> Contact {
     }
 }
 
-/// What of a body a mirror is compared by: its ends, and of a tube the bore.
+/// The lengths by which a body and its mirror image are compared: its ends, and of a tube the bore.
 fn outline_m(body: &Body) -> Option<(Ends, Option<f64>)> {
     match &body.solid {
         Solid::Box(_) => ends_m(body, &UPRIGHT).map(|ends| (ends, None)),
@@ -141,7 +141,7 @@ pub fn joined(boxes: &[(Body, f64)], cuts_m: [Option<f64>; 2]) -> Vec<Face> {
     faces.into_iter().map(moved).collect()
 }
 
-/// What the planes of all sides cut space into.
+/// The cells into which the planes of all sides cut space.
 struct Cells {
     planes: [Vec<f64>; 3],
     /// [x][y][z], x slowest.

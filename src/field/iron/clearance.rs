@@ -5,7 +5,7 @@ use super::face::{Face, Panel, Point};
 
 /// Halvings of a face within which its distance from another body is looked for.
 const MOST_HALVINGS: usize = 10;
-/// What rounding makes of a distance, m.
+/// Rounding of a distance, m.
 const ROUNDING_M: f64 = 1e-12;
 /// A piece of a curved face reaches no farther than so many of its rim's distances.
 const BULGE: f64 = 1.1;

@@ -115,7 +115,7 @@ impl IronPull {
         places_m: &[Point],
         tolerance: f64,
     ) -> Option<Self> {
-        let wanted = coarsest(tolerance);
+        let requested = coarsest(tolerance);
         let images = iron.images().len();
         // Entries and their factors are held at once.
         let fits = |tier: &usize| {
@@ -125,7 +125,7 @@ impl IronPull {
         let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
         let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
         let bound = magnet.magnet_rule(lowest_m).bound();
-        let first = wanted.min(last - 1);
+        let first = requested.min(last - 1);
         let mut pull = Self::at_resolution(iron, magnet, first)?;
         let coarsest = pull.forces_n(places_m);
         let mut forces = coarsest.clone();

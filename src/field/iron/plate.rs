@@ -82,7 +82,7 @@ pub enum Fault {
     HoleAtEdge {
         /// Its index.
         hole: usize,
-        /// What is resolved, m.
+        /// The least length that is resolved, m.
         least_m: f64,
     },
     /// A hole cuts the foot of a core, or nearly.
@@ -92,7 +92,7 @@ pub enum Fault {
         hole: usize,
         /// The coil's.
         coil: usize,
-        /// What is resolved, m.
+        /// The least length that is resolved, m.
         least_m: f64,
     },
     /// A hole cuts another, or nearly.
@@ -102,7 +102,7 @@ pub enum Fault {
         hole: usize,
         /// That of the other.
         other: usize,
-        /// What is resolved, m.
+        /// The least length that is resolved, m.
         least_m: f64,
     },
 }
@@ -124,7 +124,7 @@ impl Plate {
     }
 }
 
-/// What is left between a hole and an edge is resolved from this part of the hole's radius on.
+/// The steel between a hole and an edge is resolved from this part of the hole's radius on.
 const LEAST_LEFT: f64 = 0.1;
 
 pub(super) fn is_apart(hole: &Site, other: &Site) -> bool {
@@ -158,7 +158,7 @@ pub(super) fn check_holes(plate: &Plate, feet: Option<&Vec<Site>>) -> Result<(),
     Ok(())
 }
 
-/// What lies nearer to one core or hole than to the others, on the plate: about its axis, lines n.x = c and
+/// The part of the plate nearer to one core or hole than to the others: about its axis, lines n.x = c and
 /// the plate's rim.
 pub(super) struct Cell {
     /// n, c, and whether it is the plate's edge.

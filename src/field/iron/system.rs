@@ -28,14 +28,14 @@ pub(super) struct FactoredSystem {
     factors: Vec<Factored>,
 }
 
-/// What the equations of every parity share.
+/// Data that the equations of every parity share.
 #[derive(Debug, Clone)]
 struct Parities {
     size: usize,
     images: usize,
     /// Of every parity and body whose constant it allows: nodes with their share of its area.
     constants: Vec<Vec<Vec<(usize, f64)>>>,
-    /// What the unknowns are to be multiplied by to be layers.
+    /// Factors that turn the unknowns into layers.
     strengths: Vec<f64>,
 }
 
@@ -229,7 +229,7 @@ impl Parities {
     ) -> Vec<DMatrix<f64>> {
         let columns = potentials[0].ncols();
         let mut layers = vec![DMatrix::zeros(self.size, columns); self.images];
-        // What rounding leaves of a drive that has none of a parity is not to be resolved.
+        // Rounding errors of a drive that has none of a parity are not resolved.
         let size = potentials.iter().map(DMatrix::amax).fold(0.0, f64::max);
         for parity in 0..self.images {
             let mut right = DMatrix::zeros(self.size, columns);

@@ -179,7 +179,7 @@ pub struct CoupledArray {
     pub iterations: usize,
 }
 
-/// What every core receives for one ampere in each coil.
+/// The potentials that every core receives for one ampere in each coil.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 enum Potentials {
     /// [drive][core][exchange grid].

@@ -68,7 +68,7 @@ impl Level {
 pub struct ArraySources {
     drives: usize,
     top_m: f64,
-    /// What distances are from; `None` where there is one level only.
+    /// The origin of distances; `None` where there is one level only.
     shape: Option<CoreShape>,
     /// The cores' axes, m.
     positions_m: Vec<[f64; 2]>,

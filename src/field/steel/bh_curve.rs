@@ -207,23 +207,23 @@ impl BhCurve {
         let most_permeable = steps
             .clone()
             .fold(0, |best, k| if chord(k) < chord(best) { k } else { best });
-        let wanted = chord(most_permeable) / KNEE_SHARE;
+        let requested = chord(most_permeable) / KNEE_SHARE;
         let reaches = steps.skip(most_permeable + 1).find_map(|k| {
             let width = self.b_t[k + 1] - self.b_t[k];
-            self.first_of_slope(k, width, wanted)
+            self.first_of_slope(k, width, requested)
                 .map(|t| self.b_t[k] + t)
         });
         reaches.unwrap_or_else(|| self.largest_b_t())
     }
 
-    /// The first t in interval `k` with a slope of `wanted` or more.
-    fn first_of_slope(&self, k: usize, width: f64, wanted: f64) -> Option<f64> {
-        if self.slope_in(k, 0.0) >= wanted {
+    /// The first t in interval `k` with a slope of `requested` or more.
+    fn first_of_slope(&self, k: usize, width: f64, requested: f64) -> Option<f64> {
+        if self.slope_in(k, 0.0) >= requested {
             return Some(0.0);
         }
         // Up to its steepest place the slope, a parabola, only grows or falls below its start.
         let steepest = self.steepest_in(k, width);
-        if self.slope_in(k, steepest) < wanted {
+        if self.slope_in(k, steepest) < requested {
             return None;
         }
         let (mut low, mut high) = (0.0, steepest);
@@ -232,7 +232,7 @@ impl BhCurve {
             if middle <= low || middle >= high {
                 return Some(high);
             }
-            if self.slope_in(k, middle) < wanted {
+            if self.slope_in(k, middle) < requested {
                 low = middle;
             } else {
                 high = middle;

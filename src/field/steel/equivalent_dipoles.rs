@@ -150,7 +150,7 @@ impl Waves {
     }
 }
 
-/// What the dipoles of a level are to stand for.
+/// The layers that the dipoles of a level represent.
 struct DipoleTask<'a> {
     outline: &'a Generatrix,
     layers: &'a CoreLayers<'a>,
@@ -281,7 +281,7 @@ impl<'a> DipoleTask<'a> {
         (COMPARED_SHARE / cores.sqrt()).max(LEAST_SHARE) * self.near.tolerance
     }
 
-    /// What errors of every component at each of `places_m` are relative to.
+    /// The scale of errors of every component at each of `places_m`.
     fn sizes(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
         let top_m = self.outline.shape.top_m.max(0.0);
         let height = |z_m: f64| z_m.max(top_m).max(self.height_m);
@@ -323,7 +323,7 @@ impl<'a> DipoleTask<'a> {
             let z_m = shape.top_m - part * shape.length_m();
             [shape.radius_m + floor_m, z_m]
         });
-        // What decays slowly is seen from afar.
+        // Slowly decaying fields matter far away.
         let farther = [[0.0, 1.0], [1.0, 1.0], [2.0, 2.0]];
         let farther = farther.map(|by| by.map(|by| by * shape.radius_m));
         let away = [[1.0, 1.0], [0.5, 3.0], [4.0, 4.0]];

@@ -1,6 +1,6 @@
 //! The exchange of hundreds of identical cores, in the few potentials that they send each other.
 //!
-//! What arrives at a core from elsewhere is smooth there: with the columns of P, orthonormal potentials
+//! Fields that arrive at a core from elsewhere are smooth there: with the columns of P, orthonormal potentials
 //! on its exchange grid, and of Q, the moments that are felt elsewhere, the potential that one core sends
 //! another is K = P A Q' but for a stated part, and the moments q of every core follow from b = Q' q,
 //!
@@ -88,7 +88,7 @@ fn parts_of_mode(columns: &DMatrix<f64>, rings: usize, mode: usize) -> DMatrix<f
     parts.transpose().qr().r().transpose()
 }
 
-/// What makes a wave with amplitudes of norm one a vector of norm one on the grid.
+/// The factor that makes a wave with amplitudes of norm one a vector of norm one on the grid.
 fn norm(mode: usize, angles: usize) -> f64 {
     (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt()
 }
@@ -188,7 +188,7 @@ fn turned(waves: &[Wave], motion: &Motion, coefficients: &DMatrix<f64>) -> DMatr
     out
 }
 
-/// What passes between two cores at one offset of the first eighth of the plane.
+/// The exchange between two cores at one offset of the first eighth of the plane.
 struct Passed {
     /// Coefficients received for coefficients sent.
     block: DMatrix<f64>,

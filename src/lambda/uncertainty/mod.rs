@@ -1,4 +1,4 @@
-//! What is uncertain on a real display costs the felt force, and which currents it costs least.
+//! The felt error that the uncertainties of a real display cause, and the currents for which it is least.
 //!
 //! A force per ampere `G` is that of the magnet's moment along its own axis and along both axes across;
 //! around a place where it is measured or meant to be, the magnet is displaced, tilted, warmer, and its

@@ -5,7 +5,7 @@ use fluxform_base::uncertainty::Uncertainty;
 use super::{ErrorForm, ON_AXES, ON_DIAGONALS, displaced};
 use crate::problem::ForceProblem;
 
-/// What a runtime needs to know of the uncertainties. A bundle holds no force on a tilted magnet, so the tilt
+/// The uncertainties as a runtime needs them. A bundle holds no force on a tilted magnet, so the tilt
 /// takes part by the price that was chosen with it, and not here.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobustRuntime {

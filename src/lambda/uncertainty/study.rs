@@ -71,7 +71,7 @@ pub struct FeltError {
     pub mean_power_w: f64,
 }
 
-/// What currents of one kind promise, and what random displays give.
+/// The error that currents of one kind promise, and that of random displays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CurrentsError {
     /// By the quadratic form.
@@ -121,7 +121,7 @@ pub struct Shares {
     pub robust: f64,
 }
 
-/// What one uncertainty costs.
+/// The error that one uncertainty causes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CauseCost {
     /// Which.
@@ -160,7 +160,7 @@ pub struct Study {
     pub robust: RobustSetting,
     /// The expected errors of the same currents if nothing were uncertain.
     pub exact: Shares,
-    /// What each uncertainty costs, the one first whose halving gains most.
+    /// The error that each uncertainty causes, the one first whose halving gains most.
     pub causes: Vec<CauseCost>,
 }
 
@@ -443,7 +443,7 @@ fn followed(around: &Surroundings, lambda: f64) -> Result<Currents, StudyError> 
 struct Chooser<'a> {
     bench: &'a Bench<'a>,
     forms: &'a [Forms],
-    /// What is minimised: of every point, or of all together.
+    /// The quantity that is minimised: of every point, or of all together.
     combined: Vec<ErrorForm>,
     fixed: bool,
 }
@@ -485,7 +485,7 @@ impl<'a> Chooser<'a> {
         (currents, error)
     }
 
-    /// What is to be small: the error of what is requested.
+    /// The objective: the error of the requested force.
     fn aim(&self, error: &FeltError) -> f64 {
         if self.bench.around.vector {
             error.expected
@@ -605,7 +605,7 @@ pub fn study(
     }))
 }
 
-/// What each uncertainty costs with three kinds of currents.
+/// The error that each uncertainty causes with three kinds of currents.
 struct Costs<'a> {
     bench: &'a Bench<'a>,
     given: &'a Uncertainty,

@@ -110,7 +110,7 @@ impl Errors<'_, '_> {
         Ok(self.free.at(lambda)?.line())
     }
 
-    /// What counts as rounding in `t* - t_0` at `lambda`.
+    /// The rounding error of `t* - t_0` at `lambda`.
     fn visible(&self, lambda: Num) -> Num {
         Num::of(VISIBLE.max(4.0 * self.doubt)) * (self.top * lambda + self.without)
     }

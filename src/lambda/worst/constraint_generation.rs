@@ -168,7 +168,7 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
     let currents_a = scaled.amperes(stand.z);
     let lambda_n_per_m = times_power(lambda, lambda_unit);
     let pushed = scaled.pushed_n(&currents_a);
-    let wanted = lambda_n_per_m.abs() * scaled.height_m() + scaled.offset_n();
+    let requested = lambda_n_per_m.abs() * scaled.height_m() + scaled.offset_n();
     let moves = form == Form::Worst;
     let rates_a: Vec<f64> = scaled
         .amperes(stand.rate)
@@ -178,8 +178,8 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
     let rounding = ROUNDINGS * f64::EPSILON;
     Course {
         rounding_n: times_power(NOTHING, force_unit)
-            + rounding * (wanted + pushed)
-            + scaled.leeway * wanted,
+            + rounding * (requested + pushed)
+            + scaled.leeway * requested,
         rounding_m: rounding * (scaled.height_m() + scaled.pushed_n(&rates_a)),
         limit_rate_m: if moves {
             times_power(last(stand.rate), force_unit - lambda_unit)
@@ -207,12 +207,12 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, 
     let mut doubt = 0.0_f64;
     let mut probe = |lambda: f64, offset_share: f64, bound: f64, currents_a: Vec<f64>| {
         let lambda_n_per_m = times_power(lambda, lambda_unit);
-        let wanted = lambda_n_per_m.abs() * scaled.height_m() + offset_share * scaled.offset_n();
+        let requested = lambda_n_per_m.abs() * scaled.height_m() + offset_share * scaled.offset_n();
         let pushed = scaled.pushed_n(&currents_a);
         let rounding =
-            2.0 * (ROUNDINGS * f64::EPSILON * (wanted + pushed) + scaled.leeway * wanted);
-        if wanted > 0.0 {
-            doubt = doubt.max(rounding / wanted);
+            2.0 * (ROUNDINGS * f64::EPSILON * (requested + pushed) + scaled.leeway * requested);
+        if requested > 0.0 {
+            doubt = doubt.max(rounding / requested);
         }
         Probe {
             lambda_n_per_m,

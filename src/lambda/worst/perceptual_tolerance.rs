@@ -108,11 +108,11 @@ fn most_of_tolerance(
 ) -> (usize, f64) {
     let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
     let parts = rows.zip(problem.height_m).enumerate().map(|(j, (row, h))| {
-        let wanted = found.lambda_n_per_m * h;
+        let requested = found.lambda_n_per_m * h;
         let offset = problem.offset_n.map_or(0.0, |offset| offset[j]);
         let pushed: f64 = row.iter().zip(&found.currents_a).map(|(g, i)| g * i).sum();
-        let error = (wanted - offset - pushed).abs();
-        (j, error / (share * wanted).max(threshold_n))
+        let error = (requested - offset - pushed).abs();
+        (j, error / (share * requested).max(threshold_n))
     });
     parts.fold(
         (0, 0.0),

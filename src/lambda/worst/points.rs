@@ -164,7 +164,7 @@ mod tests {
             let times = |j: usize, i: &[f64]| forces[2 * j] * i[0] + forces[2 * j + 1] * i[1];
             // How far above, or the step till then.
             let rows = (0..count).flat_map(|j| [(j, true), (j, false)]);
-            let mut wanted: Vec<((usize, bool), [f64; 2])> = rows
+            let mut requested: Vec<((usize, bool), [f64; 2])> = rows
                 .filter(|(_, up)| *up || form == Form::Worst)
                 .filter_map(|(j, up)| {
                     let sign = if up { 1.0 } else { -1.0 };
@@ -180,12 +180,12 @@ mod tests {
                     }
                 })
                 .collect();
-            wanted.sort_by(|a, b| a.1.partial_cmp(&b.1).unwrap());
-            let missed = wanted.iter().filter(|row| row.1[0] < 0.0).count();
+            requested.sort_by(|a, b| a.1.partial_cmp(&b.1).unwrap());
+            let missed = requested.iter().filter(|row| row.1[0] < 0.0).count();
             assert_eq!(missed > 0, limit_n < 2.0);
-            assert!(wanted.len() > 10, "{}", wanted.len());
+            assert!(requested.len() > 10, "{}", requested.len());
             let mut held = vec![0; count];
-            for (row, _) in wanted {
+            for (row, _) in requested {
                 // A row missed already is also left at once: it may only come once.
                 assert_eq!(first_missed(points, &held, &course, form), Some(row));
                 held[row.0] |= bit(row.1);

@@ -38,7 +38,7 @@ pub(super) fn worst_error_n(problem: &ForceProblem, lambda: f64, currents_a: &[f
 pub fn lower_bound_n(problem: &ForceProblem, lambda: f64, active: &[ActivePoint]) -> f64 {
     let coils = problem.coils();
     let mut slope = vec![Num::ZERO; coils];
-    let (mut wanted, mut share) = (Num::ZERO, Num::ZERO);
+    let (mut requested, mut share) = (Num::ZERO, Num::ZERO);
     for active in active {
         let weight = Num::of(active.multiplier);
         let row = &problem.forces_n_per_a[active.point * coils..(active.point + 1) * coils];
@@ -46,7 +46,7 @@ pub fn lower_bound_n(problem: &ForceProblem, lambda: f64, active: &[ActivePoint]
             *sum += weight * Num::of(force);
         }
         let offset = problem.offset_n.map_or(0.0, |offset| offset[active.point]);
-        wanted +=
+        requested +=
             weight * (Num::of(lambda) * Num::of(problem.height_m[active.point]) - Num::of(offset));
         share += weight.abs();
     }
@@ -59,5 +59,5 @@ pub fn lower_bound_n(problem: &ForceProblem, lambda: f64, active: &[ActivePoint]
         .iter()
         .zip(&best)
         .fold(Num::ZERO, |sum, (&s, &i)| sum + Num::of(s) * Num::of(i));
-    ((wanted - pushed) / share).to_f64().max(0.0)
+    ((requested - pushed) / share).to_f64().max(0.0)
 }

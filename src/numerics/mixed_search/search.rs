@@ -62,7 +62,7 @@ pub struct Sample {
 
 /// Evaluated together.
 const BATCH: usize = 4;
-/// Designs about the given one before the first descent, besides one per variable.
+/// Designs about the given one before the first descent, beside one per variable.
 const NEAR_GIVEN: usize = 2;
 /// Designs over all ranges before the second, per variable and in all.
 const SPREAD_PER_VARIABLE: usize = 2;

@@ -36,7 +36,7 @@ impl Surface {
         };
         let error_n = object.curves.chosen.as_ref().map(|forces| {
             let pairs = forces.static_n.iter().zip(&forces.requested_n);
-            at_points(&mut pairs.map(|(given, wanted)| given - wanted))
+            at_points(&mut pairs.map(|(given, target)| given - target))
         });
         Self {
             x_m: [grid.x_m.from_m, grid.x_m.to_m],

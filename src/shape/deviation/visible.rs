@@ -134,10 +134,10 @@ mod tests {
     #[test]
     fn a_segment_is_cut_where_it_crosses_the_polygon() {
         let square = Polygon::of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
-        let close = |found: Option<[f64; 2]>, wanted: [f64; 2]| {
+        let close = |found: Option<[f64; 2]>, requested: [f64; 2]| {
             let found = found.unwrap();
             assert!(
-                (0..2).all(|k| (found[k] - wanted[k]).abs() < 1e-15),
+                (0..2).all(|k| (found[k] - requested[k]).abs() < 1e-15),
                 "{found:?}"
             );
         };

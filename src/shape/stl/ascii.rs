@@ -127,12 +127,12 @@ impl Reader<'_> {
         Ok(triangle)
     }
 
-    fn expect(&mut self, wanted: &str) -> Result<(), StlError> {
+    fn expect(&mut self, requested: &str) -> Result<(), StlError> {
         let word = self.words.next();
-        if is(word, wanted) {
+        if is(word, requested) {
             Ok(())
         } else {
-            Err(self.unexpected(&format!("`{wanted}`"), word))
+            Err(self.unexpected(&format!("`{requested}`"), word))
         }
     }
 
@@ -143,10 +143,10 @@ impl Reader<'_> {
         self.numbers.read(word).map_err(|what| self.fault(what))
     }
 
-    fn unexpected(&self, wanted: &str, found: Option<&[u8]>) -> StlError {
+    fn unexpected(&self, requested: &str, found: Option<&[u8]>) -> StlError {
         self.fault(match found {
-            Some(word) => format!("expected {wanted}, found `{}`", shown(word)),
-            None => format!("expected {wanted}, but the file ends here: it was cut short"),
+            Some(word) => format!("expected {requested}, found `{}`", shown(word)),
+            None => format!("expected {requested}, but the file ends here: it was cut short"),
         })
     }
 
@@ -159,8 +159,8 @@ impl Reader<'_> {
     }
 }
 
-fn is(word: Option<&[u8]>, wanted: &str) -> bool {
-    word.is_some_and(|w| w.eq_ignore_ascii_case(wanted.as_bytes()))
+fn is(word: Option<&[u8]>, requested: &str) -> bool {
+    word.is_some_and(|w| w.eq_ignore_ascii_case(requested.as_bytes()))
 }
 
 /// Words between white space, and where they are.

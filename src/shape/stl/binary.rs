@@ -19,14 +19,14 @@ const SIGN: u32 = 1 << 31;
 
 /// True when the length is what the header's count asks for.
 pub(super) fn length_fits(bytes: &[u8]) -> bool {
-    count(bytes).is_some_and(|n| wanted(n) == bytes.len() as u64)
+    count(bytes).is_some_and(|n| requested(n) == bytes.len() as u64)
 }
 
 fn count(bytes: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?))
 }
 
-fn wanted(count: u32) -> u64 {
+fn requested(count: u32) -> u64 {
     HEADER as u64 + RECORD as u64 * u64::from(count)
 }
 
@@ -48,7 +48,7 @@ pub(super) fn read_from(
         return Ok(None);
     }
     source.read_exact(&mut header)?;
-    let Some(claimed) = count(&header).filter(|n| wanted(*n) == length) else {
+    let Some(claimed) = count(&header).filter(|n| requested(*n) == length) else {
         return Ok(None);
     };
     let mut left = claimed as usize;
@@ -140,14 +140,14 @@ pub(super) fn fault(bytes: &[u8]) -> StlError {
         return StlError::NoHeader { length };
     };
     let swapped = claimed.swap_bytes();
-    if wanted(swapped) == length as u64 {
+    if requested(swapped) == length as u64 {
         return StlError::BigEndian { count: swapped };
     }
     let there = length - HEADER;
-    if wanted(claimed) > length as u64 {
+    if requested(claimed) > length as u64 {
         return StlError::CutShort {
             claimed,
-            wanted: wanted(claimed),
+            requested: requested(claimed),
             length,
             whole: there / RECORD,
             rest: there % RECORD,

@@ -41,7 +41,7 @@ pub(super) enum StlError {
     },
     /// The file ends before its last triangle.
     #[error(
-        "binary STL whose header claims {claimed} triangles ({wanted} bytes), but the file has \
+        "binary STL whose header claims {claimed} triangles ({requested} bytes), but the file has \
          {length} bytes: {whole} whole triangles{}; it was cut short or the count \
          (bytes 80 to 83) is wrong; export or copy it again",
         if *rest == 0 { String::new() } else { format!(" and {rest} bytes of another") }
@@ -50,7 +50,7 @@ pub(super) enum StlError {
         /// The header's count.
         claimed: u32,
         /// Bytes that such a file has.
-        wanted: u64,
+        requested: u64,
         /// Bytes in the file.
         length: usize,
         /// Whole triangles that are there.

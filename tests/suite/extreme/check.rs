@@ -34,21 +34,21 @@ pub fn reported(error: impl Display) -> String {
 }
 
 /// One number against another, relative to that; absolute where that is 0.
-pub fn close(found: f64, wanted: f64, unit: &str) -> Outcome {
+pub fn close(found: f64, expected: f64, unit: &str) -> Outcome {
     Ok(Got {
-        value: format!("{found:.12e} {unit} (expected {wanted:.12e})"),
-        error: off(found, wanted),
+        value: format!("{found:.12e} {unit} (expected {expected:.12e})"),
+        error: off(found, expected),
     })
 }
 
 /// Relative difference; absolute where 0 is expected.
-pub fn off(found: f64, wanted: f64) -> f64 {
-    if wanted == 0.0 {
+pub fn off(found: f64, expected: f64) -> f64 {
+    if expected == 0.0 {
         found.abs()
-    } else if found == wanted {
+    } else if found == expected {
         0.0
     } else {
-        (found / wanted - 1.0).abs()
+        (found / expected - 1.0).abs()
     }
 }
 

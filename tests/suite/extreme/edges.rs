@@ -326,8 +326,8 @@ fn inductances() -> Vec<Case> {
                 let (a, w) = (0.1, 1e-6);
                 let ring = winding(a - 0.5 * w, a + 0.5 * w, w, 3.0);
                 let mean = w * (2.0_f64.ln() / 3.0 + PI / 3.0 - 25.0 / 12.0).exp();
-                let wanted = MU_0_T_M_PER_A * a * 9.0 * ((8.0 * a / mean).ln() - 2.0);
-                close(self_inductance_h(&ring), wanted, "H")
+                let expected = MU_0_T_M_PER_A * a * 9.0 * ((8.0 * a / mean).ln() - 2.0);
+                close(self_inductance_h(&ring), expected, "H")
             },
         ),
         case(
@@ -337,11 +337,11 @@ fn inductances() -> Vec<Case> {
             || {
                 let (a, w, l) = (0.0005, 1e-9, 0.7);
                 let ratio: f64 = a / l;
-                let wanted = MU_0_T_M_PER_A * 1e6 * PI * a * a / l
+                let expected = MU_0_T_M_PER_A * 1e6 * PI * a * a / l
                     * (1.0 - 8.0 * ratio / (3.0 * PI) + 0.5 * ratio * ratio);
                 close(
                     self_inductance_h(&winding(a, a + w, l, 1000.0)),
-                    wanted,
+                    expected,
                     "H",
                 )
             },
@@ -368,8 +368,8 @@ fn inductances() -> Vec<Case> {
             || {
                 let moment =
                     1429.0 * PI * (0.012_f64.powi(2) + 0.012 * 0.019 + 0.019_f64.powi(2)) / 3.0;
-                let wanted = -MU_0_T_M_PER_A * moment * moment / (4.0 * PI * 1e6);
-                close(mutual_inductance_h(&SEED, 100.0), wanted, "H")
+                let expected = -MU_0_T_M_PER_A * moment * moment / (4.0 * PI * 1e6);
+                close(mutual_inductance_h(&SEED, 100.0), expected, "H")
             },
         ),
         case(

@@ -52,9 +52,9 @@ fn per_chi(chi: f64) -> Result<[f64; 2], String> {
 
 /// Against chi = 1e-6, whose second order is chi times a demagnetising factor below 1.
 fn weak(chi: f64) -> Outcome {
-    let (found, wanted) = (per_chi(chi)?, per_chi(1e-6)?);
+    let (found, expected) = (per_chi(chi)?, per_chi(1e-6)?);
     worst(
-        [0, 1].map(|k| off(found[k], wanted[k])),
+        [0, 1].map(|k| off(found[k], expected[k])),
         &format!("{:.6e} T/m/A and {:.6e} H per chi", found[0], found[1]),
     )
 }
@@ -63,9 +63,9 @@ fn weak(chi: f64) -> Outcome {
 fn limit(mu_r: f64, other: f64) -> Outcome {
     let (a, b) = (solved(mu_r, 1e-7)?, solved(other, 1e-7)?);
     let of = |c: &CoredCoil| [c.core.field(0.0, 0.03).dbz_dz, c.added_inductance_h];
-    let (found, wanted) = (of(&a), of(&b));
+    let (found, expected) = (of(&a), of(&b));
     worst(
-        [0, 1].map(|k| off(found[k], wanted[k])),
+        [0, 1].map(|k| off(found[k], expected[k])),
         &format!("{:.9e} T/m/A, {:.9e} H", found[0], found[1]),
     )
 }
@@ -433,8 +433,8 @@ fn saturated() -> Vec<Case> {
             4e-4,
             || {
                 let found = fluxes(&Constant { relative: 1000.0 }, &[1.0])?[0];
-                let wanted = solved(1000.0, 1e-7)?.added_inductance_h;
-                measured(off(found, wanted), format!("{found:.9e} H"))
+                let expected = solved(1000.0, 1e-7)?.added_inductance_h;
+                measured(off(found, expected), format!("{found:.9e} H"))
             },
         ),
         case(
@@ -443,8 +443,8 @@ fn saturated() -> Vec<Case> {
             4e-4,
             || {
                 let found = fluxes(&Kinked, &[1e-6])?[0] / 1e-6;
-                let wanted = solved(1000.0, 1e-7)?.added_inductance_h;
-                measured(off(found, wanted), format!("{found:.9e} H"))
+                let expected = solved(1000.0, 1e-7)?.added_inductance_h;
+                measured(off(found, expected), format!("{found:.9e} H"))
             },
         ),
         case(
@@ -464,10 +464,10 @@ fn saturated() -> Vec<Case> {
                     }
                 }
                 let volume = std::f64::consts::TAU * 0.5 * CORE.radius_m * 0.5 * 0.11;
-                let wanted = FULL_A_PER_M * volume * sum;
+                let expected = FULL_A_PER_M * volume * sum;
                 measured(
-                    off(found, wanted),
-                    format!("{found:.6e} Wb of {wanted:.6e}"),
+                    off(found, expected),
+                    format!("{found:.6e} Wb of {expected:.6e}"),
                 )
             },
         ),

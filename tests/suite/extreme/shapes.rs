@@ -36,12 +36,12 @@ fn sampled(triangles: Vec<Triangle>, grid: &Grid) -> Result<Vec<Option<Sample>>,
     heights(&mesh(triangles)?, grid, &Silent).map_err(reported)
 }
 
-/// Heights of a mesh over a grid that it covers, against `wanted`, over `size`.
+/// Heights of a mesh over a grid that it covers, against `expected`, over `size`.
 pub fn against(
     triangles: Vec<Triangle>,
     grid: &Grid,
     size: f64,
-    wanted: impl Fn(f64, f64) -> f64,
+    expected: impl Fn(f64, f64) -> f64,
 ) -> Outcome {
     let found = sampled(triangles, grid)?;
     let columns = grid.x_m.samples;
@@ -51,7 +51,7 @@ pub fn against(
         let height = sample
             .ok_or_else(|| format!("no surface over ({x}, {y})"))?
             .height_m;
-        errors.push((height - wanted(x, y)).abs() / size);
+        errors.push((height - expected(x, y)).abs() / size);
     }
     worst(errors, "heights")
 }
@@ -354,8 +354,8 @@ fn sphere(radius_m: f64) -> Outcome {
             0.0,
         )?;
         // At the rim the height is the root of the rounding.
-        let wanted = radius_m * ((1.0 - part) * (1.0 + part)).sqrt();
-        errors.push((found - wanted).abs() / radius_m);
+        let expected = radius_m * ((1.0 - part) * (1.0 + part)).sqrt();
+        errors.push((found - expected).abs() / radius_m);
     }
     worst(errors, "heights over the radius")
 }

@@ -53,9 +53,9 @@ fn pair(k: f64, at_s: f64, bound_of: impl Fn(f64) -> f64) -> Outcome {
     let mut found = [0.0; 2];
     drive.currents(&mut found);
     let (sum, difference) = (-(-at_s / (1.0 + k)).exp_m1(), -(-at_s / (1.0 - k)).exp_m1());
-    let wanted = [0.5 * (sum + difference), 0.5 * (sum - difference)];
+    let expected = [0.5 * (sum + difference), 0.5 * (sum - difference)];
     worst(
-        [0, 1].map(|i| bound_of((found[i] - wanted[i]).abs())),
+        [0, 1].map(|i| bound_of((found[i] - expected[i]).abs())),
         &format!("{:.12} and {:.12} A", found[0], found[1]),
     )
 }
@@ -69,9 +69,9 @@ fn circuits() -> Vec<Case> {
             1e-14,
             || {
                 let found = held(&[1.0, 0.0, 0.0, 1e-6], &[1.0, 1.0], 1e-6, 1)?;
-                let wanted = [-1.7 * (-1e-6_f64).exp_m1(), 0.6 * (-1.0_f64).exp_m1()];
+                let expected = [-1.7 * (-1e-6_f64).exp_m1(), 0.6 * (-1.0_f64).exp_m1()];
                 worst(
-                    [off(found[0], wanted[0]), off(found[1], wanted[1])],
+                    [off(found[0], expected[0]), off(found[1], expected[1])],
                     &format!("{:.9e} and {:.9e} A", found[0], found[1]),
                 )
             },

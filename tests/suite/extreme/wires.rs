@@ -71,9 +71,9 @@ fn circuits() -> Vec<Case> {
             1e-12,
             || {
                 let tau = |d: f64| Circuit::of_air_coil(&COIL, &wire(d)).time_constant_s();
-                let wanted = tau(7e-4);
+                let expected = tau(7e-4);
                 worst(
-                    [2e-5, 1e-4, 2e-3, 5e-3].map(|d| off(tau(d), wanted)),
+                    [2e-5, 1e-4, 2e-3, 5e-3].map(|d| off(tau(d), expected)),
                     "time constants",
                 )
             },
@@ -87,9 +87,9 @@ fn circuits() -> Vec<Case> {
                     let circuit = Circuit::of_air_coil(&COIL, &wire(d));
                     circuit.power_w(2858.0 / circuit.turns)
                 };
-                let wanted = heat(7e-4);
+                let expected = heat(7e-4);
                 worst(
-                    [2e-5, 1e-4, 2e-3, 5e-3].map(|d| off(heat(d), wanted)),
+                    [2e-5, 1e-4, 2e-3, 5e-3].map(|d| off(heat(d), expected)),
                     "heats",
                 )
             },

@@ -128,15 +128,15 @@ pub fn laws(
     progress: &dyn Progress,
 ) -> Result<Vec<Law>, RunError> {
     let quick = request.pace.quick;
-    let wanted = |spec: &&Spec| request.laws.is_empty() || request.laws.contains(&spec.name());
+    let expected = |spec: &&Spec| request.laws.is_empty() || request.laws.contains(&spec.name());
     let idle = child(IDLE, IDLE, 0, 1)?.peak_bytes;
     let most = std::thread::available_parallelism().map_or(1, usize::from);
-    let chosen = LAWS.iter().filter(wanted);
+    let chosen = LAWS.iter().filter(expected);
     let count = chosen.map(|spec| spec.settings(quick, most).len());
     progress.begin("scaling", count.sum::<usize>() as u64);
     let mut laws = Vec::new();
     for spec in &LAWS {
-        if !wanted(&spec) {
+        if !expected(&spec) {
             let same = |law: &&Law| law.stage == spec.stage && law.axis == spec.axis;
             laws.extend(earlier.iter().find(same).cloned());
             continue;

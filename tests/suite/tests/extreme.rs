@@ -132,13 +132,13 @@ fn the_table_has_the_keys_it_must_have() {
         let row = json["cases"][row].as_object().unwrap();
         row.keys().map(String::as_str).collect()
     };
-    let mut wanted = [
+    let mut target = [
         "name", "expected", "got", "error", "bound", "seconds", "pass",
     ];
-    wanted.sort_unstable();
+    target.sort_unstable();
     let mut found = keys(0);
     found.sort_unstable();
-    assert_eq!(found, wanted);
+    assert_eq!(found, target);
     let schema = SCHEMAS
         .iter()
         .find(|(name, _)| *name == "extreme.schema.json");

@@ -70,7 +70,7 @@ pub struct ArrayFlags {
     pub surface: SurfaceFlags,
 }
 
-/// What the two kinds of `optimize` share.
+/// Arguments that the two kinds of `optimize` share.
 pub struct Shared<'a> {
     /// Design file.
     pub design: &'a FileArgument,
@@ -335,7 +335,7 @@ fn vary(text: &str) -> Result<(String, toml::Value), String> {
     Ok((axis.key, toml::Value::Array(values)))
 }
 
-/// What will be computed, said first.
+/// The computation that follows, stated first.
 fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
     let steel = crate::scene::cost::of_steel(design, physics.tolerance(Level::Search, design));
     let seconds: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();

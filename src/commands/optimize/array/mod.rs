@@ -46,7 +46,7 @@ pub struct ArrayRequest {
     pub every_count: bool,
 }
 
-/// What every shape renders with the given design, at both levels.
+/// The merit of every shape with the given design, at both levels.
 struct Before {
     search: Physical,
     full: Physical,
@@ -116,7 +116,7 @@ pub fn optimize_array(
         room: room(design, physics),
         every_count: request.every_count,
     };
-    // What contradicts itself is known before anything is computed.
+    // Contradictions are reported before anything is computed.
     let refused = |refused: Refused| RunError::Input(refused.to_string());
     problems(design, &search, &vec![1.0; shapes.len()], physics).map_err(refused)?;
     if design.search.values(SearchKey::Height).is_none()
@@ -236,7 +236,7 @@ fn before(
     })
 }
 
-/// What was found, as it is reported.
+/// The result, as it is reported.
 ///
 /// Long because it is one literal of the result's fields.
 fn result(

@@ -1,4 +1,4 @@
-//! What a design of the search renders: forces at the shapes' points through the coupled steel.
+//! The forces that a design of the search gives at the shapes' points, through the coupled steel.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,7 +12,7 @@ use crate::bundle::artefact::sha256_hex;
 use crate::coil::array_search::problem::{Level, Physical, Physics};
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::commands::discretize;
-use crate::commands::lambda::WantedPoints;
+use crate::commands::lambda::ForcePoints;
 use crate::commands::lambda::placement::Placed;
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
@@ -73,7 +73,7 @@ impl Constant {
     }
 }
 
-/// What is made large.
+/// The aim of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aim {
     /// Which.
@@ -100,7 +100,7 @@ const LEAST_ERROR: f64 = 1e-6;
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
 
-/// What was computed, by a digest of the design.
+/// Computed properties, by a digest of the design.
 pub type Journal = BTreeMap<String, Option<Physical>>;
 
 /// Samples of a shape along one axis while searching.
@@ -115,14 +115,14 @@ pub struct ArrayPhysics<'a> {
     aim: Aim,
     tolerance: Option<f64>,
     /// Points of every shape, while searching and in the end.
-    coarse: Vec<WantedPoints>,
-    fine: Vec<WantedPoints>,
+    coarse: Vec<ForcePoints>,
+    fine: Vec<ForcePoints>,
     progress: &'a dyn Progress,
     /// Digest of all that decides forces and constants but the design.
     origin: String,
     /// Evaluations reported.
     reported: AtomicUsize,
-    /// What was computed before, in this run or an earlier one.
+    /// Properties computed before, in this run or an earlier one.
     known: Mutex<Journal>,
 }
 
@@ -137,19 +137,19 @@ impl<'a> ArrayPhysics<'a> {
         tolerance: Option<f64>,
         progress: &'a dyn Progress,
     ) -> Result<Self, RunError> {
-        let points = |most: usize| -> Result<Vec<WantedPoints>, RunError> {
+        let points = |most: usize| -> Result<Vec<ForcePoints>, RunError> {
             let of = |shape: &ShapeSource| {
                 let document = &shape.document;
                 let samples =
                     [document.grid.x, document.grid.y].map(|axis| axis.samples().min(most));
                 let report = discretize::run(&document.with_samples(samples), Vec::new(), &Silent)?;
                 let weights = report.weights.unwrap_or(Weights::Equal);
-                Ok(WantedPoints::of_grid(&report, weights))
+                Ok(ForcePoints::of_grid(&report, weights))
             };
             shapes.iter().map(of).collect()
         };
         let (coarse, fine) = (points(SEARCH_SAMPLES)?, points(usize::MAX)?);
-        let places = |points: &WantedPoints| {
+        let places = |points: &ForcePoints| {
             (
                 points.positions_m.clone(),
                 points.rule,
@@ -185,7 +185,7 @@ impl<'a> ArrayPhysics<'a> {
         })
     }
 
-    fn points(&self, level: Level) -> &[WantedPoints] {
+    fn points(&self, level: Level) -> &[ForcePoints] {
         match level {
             Level::Search => &self.coarse,
             Level::Full => &self.fine,
@@ -221,7 +221,7 @@ impl<'a> ArrayPhysics<'a> {
         }
     }
 
-    /// What is made large.
+    /// The aim of the search.
     pub fn aim(&self) -> Aim {
         self.aim
     }
@@ -249,7 +249,7 @@ impl<'a> ArrayPhysics<'a> {
         shapes.collect()
     }
 
-    /// What the design renders; `None` where it renders nothing for some shape.
+    /// The properties of the design; `None` where it renders nothing for some shape.
     ///
     /// # Errors
     /// A design that cannot be computed; interruption.
@@ -324,7 +324,7 @@ impl<'a> ArrayPhysics<'a> {
         &self,
         problem: &ForceProblem,
         vectors: Option<&[[f64; 3]]>,
-        points: &WantedPoints,
+        points: &ForcePoints,
     ) -> Result<Option<f64>, RunError> {
         if let (Constant::Error, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
             let error = relative_error(problem, lambda_n_per_m)?;
@@ -357,7 +357,7 @@ impl<'a> ArrayPhysics<'a> {
         Ok(span.largest().ok().map(|largest| largest.lambda_n_per_m))
     }
 
-    /// What was computed, to be known to a later run.
+    /// The computed properties, for a later run.
     pub fn journal(&self) -> Journal {
         self.known
             .lock()

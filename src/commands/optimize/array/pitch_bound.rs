@@ -1,4 +1,4 @@
-//! What no pitch can exceed: the gain of arrays in air of which the pitch alone is searched, bounded by
+//! A bound that no pitch exceeds: on the gain of arrays in air of which the pitch alone is searched, bounded by
 //! branch and bound.
 //!
 //! Coils in air move along straight lines, and no force moves off the straight line between two
@@ -55,7 +55,7 @@ struct Stretch {
     gain: f64,
 }
 
-/// What is the same at every pitch.
+/// Data that is the same at every pitch.
 struct Bounding<'a> {
     problem: &'a ArrayProblem<'a>,
     physics: &'a ArrayPhysics<'a>,

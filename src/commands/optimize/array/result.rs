@@ -44,7 +44,7 @@ pub struct ArrayOptimization {
     pub limits_given: BTreeMap<&'static str, LimitCheck>,
     /// Whether `evaluate` finds every limit met.
     pub limits_met: bool,
-    /// What surrounds the best array; absent where it was interrupted.
+    /// The surroundings of the best array; absent where the run was interrupted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub study: Option<Study>,
     /// How sure it is.
@@ -92,7 +92,7 @@ pub enum ArrayEnding {
     Interrupted,
 }
 
-/// What the best array does for a shape.
+/// The best array's result for a shape.
 #[derive(Debug, Clone, Serialize)]
 pub struct ShapeGain {
     /// Its name.
@@ -114,7 +114,7 @@ pub struct ShapeGain {
     pub gain: f64,
 }
 
-/// What is known of how good the best array is.
+/// The certificate of the best array.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArrayCertificate {
     /// The proof, or the search.

@@ -87,7 +87,7 @@ pub fn ended(result: &ArrayOptimization) -> String {
     }
 }
 
-/// What a step more of each limit that binds would give.
+/// The gain from a step more of each limit that binds.
 pub fn worths(study: &Study) -> Vec<String> {
     let active = study.limits.iter().filter(|limit| limit.active);
     active.map(one_more).collect()
@@ -100,7 +100,7 @@ fn worth(sheet: &mut Sheet, study: &Study) {
     }
 }
 
-/// What a step more of a limit would give.
+/// The gain from a step more of a limit.
 pub fn one_more(limit: &LimitWorth) -> String {
     let (unit, per_si) = match limit.name {
         Some(name) => name.limit().step,

@@ -242,7 +242,7 @@ fn few_patterns_and_fewer_far_dipoles_stand_for_many_cores() {
             }
         }
     }
-    // What is found at a place does not depend on the others.
+    // The field at a place does not depend on the other places.
     let mut alone = vec![0.0; every.len() * parts.count()];
     few.sample_all(&points[7..8], parts, &mut alone);
     for (column, alone) in alone.iter().enumerate() {

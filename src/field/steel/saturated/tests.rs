@@ -278,9 +278,9 @@ fn any_constant_permeability() {
     };
     let most_h = added_h(1.3e11);
     let lost_h = |relative: f64| (most_h - added_h(relative)) / (1.0 / relative - 1.0 / 1.3e11);
-    let wanted = lost_h(1.7e6);
+    let expected = lost_h(1.7e6);
     for (relative, allowed) in [(1.7e5, 1e-4), (1.7e7, 1e-4), (1.7e8, 1e-3), (1.7e9, 0.02)] {
-        let off = lost_h(relative) / wanted - 1.0;
+        let off = lost_h(relative) / expected - 1.0;
         assert!(off.abs() < allowed, "{relative:e}: {off:e}");
     }
 }

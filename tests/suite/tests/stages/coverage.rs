@@ -159,8 +159,8 @@ fn map_claims(scene: &Scene, solved: &Solved, exact: &Solved, n: &mut Random) ->
         z_m: workspace.z_m.nodes(),
     };
     let felt = MagnetMean::field();
-    let (coils, wanted) = (&scene.coils, Components::Gz);
-    let made = SceneMap::new(scene, solved, coils, &grid, wanted, &felt, &Silent).unwrap();
+    let (coils, expected) = (&scene.coils, Components::Gz);
+    let made = SceneMap::new(scene, solved, coils, &grid, expected, &felt, &Silent).unwrap();
     let (nx, ny, nz) = (grid.x_m.len(), grid.y_m.len(), grid.z_m.len());
     let moment = scene.moment_a_m2[2];
     let nodes: Vec<[usize; 3]> = (0..120)
