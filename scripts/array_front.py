@@ -115,6 +115,11 @@ def one(job):
     return costs, merits(program, str(path), paths), broken
 
 
+def undominated(points):
+    """Without those that another point beats: a front states the best of every number of coils too."""
+    return [(v, g) for v, g in points if not any(w <= v and h >= g and (w, h) != (v, g) for w, h in points)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
@@ -139,7 +144,7 @@ def main():
           "| best of those over the point | CPU s of the search |\n|---|---|---|---|---|---|")
     for index, aim in enumerate(AIMS):
         for key, name in QUANTITIES.items():
-            points = [(value, gain) for quantity, value, gain in fronts[aim] if quantity == key]
+            points = undominated([(value, gain) for quantity, value, gain in fronts[aim] if quantity == key])
             over = -1.0
             for costs, merit, broken in designs:
                 if broken - {key} or not all(m[index] for m in merit):

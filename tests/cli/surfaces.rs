@@ -106,7 +106,7 @@ fn a_pipe_is_refused_and_not_waited_for() {
         .status();
     assert!(made.unwrap().success());
     let args = ["discretize", "pipe.stl", "--unit", "mm", "--out", "-"];
-    place.run(&args).ends(3).says(&["no regular file"]);
+    place.run(&args).ends(3).says(&["not a regular file"]);
 }
 
 #[test]

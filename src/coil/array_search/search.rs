@@ -274,6 +274,33 @@ fn short(value: f64) -> String {
         .map_or(rounded, |value| value.to_string())
 }
 
+/// Searches the best choice of every number of coils but the first choice's to its end; how many arrays that took,
+/// and whether it was interrupted.
+fn finish_counts(
+    problems: &[ArrayProblem<'_>],
+    design: &Design,
+    settings: Settings,
+    first: usize,
+    left_out: &mut [(usize, Search<'_>)],
+) -> (usize, bool) {
+    let coils = |index: usize| problems[index].space.coils();
+    let (mut done, mut evaluations) = (vec![coils(first)], 0);
+    for (other, search) in left_out.iter_mut().rev() {
+        if done.contains(&coils(*other)) {
+            continue;
+        }
+        done.push(coils(*other));
+        let before = search.samples().len();
+        search.allow(settings.evaluations);
+        let stopped = is_stopped(|| search.run(&[problems[*other].space.given(design)]));
+        evaluations += search.samples().len() - before;
+        if stopped {
+            return (evaluations, true);
+        }
+    }
+    (evaluations, false)
+}
+
 /// Searches every problem and computes the best design to full accuracy.
 ///
 /// # Errors
@@ -328,18 +355,9 @@ pub fn run<'a>(
     interrupted |= accepted.is_err();
     evaluations += search.samples().len() - before;
     if request.every_count && !interrupted {
-        let coils = |index: usize| problems[index].space.coils();
-        let mut done = vec![coils(index)];
-        for (other, search) in left_out.iter_mut().rev() {
-            if done.contains(&coils(*other)) {
-                continue;
-            }
-            done.push(coils(*other));
-            let before = search.samples().len();
-            search.allow(settings.evaluations);
-            interrupted |= is_stopped(|| search.run(&[problems[*other].space.given(design)]));
-            evaluations += search.samples().len() - before;
-        }
+        let (more, stopped) = finish_counts(problems, design, settings, index, &mut left_out);
+        evaluations += more;
+        interrupted = stopped;
     }
     let (best, choices) = to_its_end(|| {
         let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));

@@ -69,8 +69,8 @@ pub struct Discretize {
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
     #[arg(long, hide_short_help = true, default_value = Certify::Vertical.name(), value_parser = values::named::<Certify>())]
     certify: Certify,
-    /// Time that --certify may take, in seconds of one core about; where it is spent, the points come
-    /// without a certificate and a warning says so
+    /// Seconds of one core, about, that --certify may take; then the points come without a certificate,
+    /// with a warning
     #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     certify_seconds: u64,

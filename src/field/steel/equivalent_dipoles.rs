@@ -38,6 +38,9 @@ const LARGEST_DRIVES: usize = 8;
 /// Growth of the distance from one level of dipoles to the next, at least, and most levels.
 const GROWTH: f64 = 2.0;
 const MOST_LEVELS: usize = 6;
+/// The least growth where at most so many cores profit from a level, which costs what its comparisons do.
+const GROWTH_OF_FEW: f64 = 6.0;
+const FEW_CORES: usize = 16;
 /// Powers of ten by which fewer dipoles may aim beside the tolerance.
 const MOST_LOOSENED: i32 = 6;
 /// The part of the tolerance that they may miss by at the places compared, and the part that those of one
@@ -469,9 +472,14 @@ fn distances_m(shape: CoreShape, positions_m: &[[f64; 2]], near: Near<'_>) -> Ve
         (x - x0).hypot(y - y0)
     };
     let extent_m = positions_m.iter().map(farthest).fold(0.0, f64::max);
+    let least = if positions_m.len() > FEW_CORES {
+        GROWTH
+    } else {
+        GROWTH_OF_FEW
+    };
     let growth = (extent_m / floor_m)
         .powf(1.0 / MOST_LEVELS as f64)
-        .max(GROWTH);
+        .max(least);
     let mut distances_m = vec![near.distance_m];
     let mut next_m = growth * floor_m;
     while next_m < extent_m {
