@@ -58,7 +58,7 @@ fn check_holes(_: &File, _: &Metadata) -> io::Result<()> {
     Ok(())
 }
 
-/// Opens the file at `path`, links followed, after [`check_plain`]; its size.
+/// Opens the file at `path`, links followed, after `check_plain`; its size.
 fn open_plain(path: &Path, max_bytes: u64) -> io::Result<(File, u64)> {
     // Asked before opening: opening a pipe would wait for its other end.
     check_plain(&path.metadata()?, max_bytes)?;
@@ -72,7 +72,7 @@ fn open_plain(path: &Path, max_bytes: u64) -> io::Result<(File, u64)> {
 /// The bytes of the plain file at `path`, links followed, no more than `max_bytes`.
 ///
 /// # Errors
-/// The system's error; those of [`check_plain`]; a file of holes.
+/// The system's error; those of a file that is not plain; a file of holes.
 pub fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     let mut content = Vec::new();
