@@ -1,18 +1,20 @@
 //! Upper bounds of lambda_jnd over all forces between two that are known.
 //!
-//! A force constant lambda is above lambda_jnd where e*(lambda) / lambda^2 > e_0 + w^2 <h^2>, e_0 being
-//! the least error without the drivers' size per unit of lambda^2 and <> the mean over the points. Of
+//! A force constant lambda is above lambda_jnd where `e*(lambda) / lambda^2 > e_0 + w^2 <h^2>`, e_0 being
+//! the least error without the drivers' size per unit of lambda^2 and `<>` the mean over the points. Of
 //! any numbers z at the points and any currents y that e_0 allows,
 //!
+//! ```text
 //! e*(lambda) / lambda^2 >= 2 <z h> - <z^2> - 2/lambda max_I <z G I>    (Fenchel; the maximum within the limits),
 //! e_0 <= <(h - G y)^2>,
+//! ```
 //!
-//! so that lambda_jnd <= 2 max_I <z G I> / (2 <z h> - <z^2> - <(h - G y)^2> - w^2 <h^2>) where the
+//! so that `lambda_jnd <= 2 max_I <z G I> / (2 <z h> - <z^2> - <(h - G y)^2> - w^2 <h^2>)` where the
 //! denominator is above zero. With z and y of the solution this is lambda_jnd itself. Both bounds are
 //! convex in G for fixed z and y: on a straight line between two matrices their ends decide. z and y are
 //! the means of both ends' solutions, so what is lost falls with the length of the line, and with its square
-//! where every coil is at a limit: the maximum over the currents of a coil between its limits has a kink. What the
-//! true forces may be off the line counts at its largest.
+//! where every coil is at a limit: the maximum over the currents of a coil between its limits has a kink. The
+//! departure of the true forces from the line counts at its largest.
 
 use fluxform_numerics::real::Real;
 
