@@ -267,7 +267,7 @@ fn name_in(folder: &Path, path: &Path) -> Option<String> {
         .map(|name| name.to_string_lossy().into_owned())
 }
 
-/// Writes `map.npz`, the other formats requested, and `map.json` into `folder`. Returns the sidecar as
+/// Writes `map.npz`, the other requested formats, and `map.json` into `folder`. Returns the sidecar as
 /// written, its `files` filled in.
 ///
 /// # Errors
