@@ -11,12 +11,13 @@ use crate::design::iron::{Hole, Iron as Described, IronShape, LinearSteel, Plate
 use crate::design::named_file::Role;
 use crate::design::{Coupling, Design};
 use crate::field::iron::array::{IronArray, IronPeaks, MOST_FACETS, Peak, Unsolved};
-use crate::field::iron::bodies::{Body, Coils, Fault, Iron, Outline, Plate, Site, Solid, UPRIGHT};
-use crate::field::iron::box_union::{self, Contact, contact, is_mirrored};
+use crate::field::iron::bodies::{
+    Body, Coils, Contact, Fault, Iron, Outline, Piece, Plate, Site, Solid, UPRIGHT, contact,
+};
 use crate::field::iron::clearance::meeting_m;
 use crate::field::iron::face::Point;
 use crate::field::iron::mesh_body::MeshBody;
-use crate::field::steel::CoreShape;
+use crate::field::iron::prisms::connected;
 use crate::field::winding::Winding;
 use crate::shape::closed_body::{BodyRequest, ClosedBodies};
 
@@ -31,8 +32,6 @@ const DEPTH_PART: f64 = 0.1;
 pub struct SceneIron {
     plate: Option<Plate>,
     bodies: Vec<IronBody>,
-    /// Bodies by their numbers: those of one entry hang together.
-    joined: Vec<Vec<usize>>,
     /// Height of the highest of it, m.
     pub(super) top_m: f64,
     /// Flux density above which a warning is due: the least of all bodies, T.
@@ -103,130 +102,95 @@ impl SceneIron {
             top_m: (heights.chain(plate.as_ref().map(|plate| plate.top_m)))
                 .fold(f64::NEG_INFINITY, f64::max),
             plate,
-            joined: joined(&bodies)?,
             bodies,
             knee_t: (design.iron.iter().map(|iron| iron.steel))
                 .chain(design.plate.as_ref().map(|plate| plate.steel))
                 .fold(f64::INFINITY, |knee, steel| knee.min(steel.knee_t)),
             put_right,
         };
-        made.check(axes, winding, core.map(|core| core.shape))?;
+        made.check(coils(design, winding, core))?;
         Ok(Some(made))
     }
 
-    fn check(
-        &self,
-        axes: &[[f64; 2]],
-        winding: &Winding,
-        core: Option<CoreShape>,
-    ) -> Result<(), RunError> {
-        let outer = winding.outer_radius_m;
-        let full = |[x, y]: [f64; 2], radius: f64, low: f64, high: f64| Body {
-            solid: Solid::Tube([0.0, radius, high - low]),
-            centre_m: [x, y, 0.5 * (low + high)],
-            turn: UPRIGHT,
-        };
-        let plate = self.plate.as_ref().map(|plate| ("[plate]", plate.body()));
-        let bodies = self.bodies.iter();
-        let bodies = bodies.map(|iron| (iron.name.as_str(), iron.body.clone()));
-        let all: Vec<(&str, Body)> = plate.into_iter().chain(bodies).collect();
-        let before = usize::from(self.plate.is_some());
-        for (number, (name, body)) in all.iter().enumerate() {
-            for (coil, axis) in axes.iter().enumerate() {
-                let room = full(*axis, outer, -winding.length_m, 0.0);
-                if let Some(at) = meeting_m(body, &room, 0.0) {
+    /// Everything with a name: the plate, the bodies and the cores.
+    fn named(&self, coils: Coils<'_>) -> Result<Vec<(String, Piece)>, RunError> {
+        let mut named = Vec::new();
+        if let Some(plate) = &self.plate {
+            let piece = Piece::plate(plate, coils).map_err(|fault| refused(fault, &[]))?;
+            named.push(("[plate]".to_owned(), piece));
+        }
+        let body = |iron: &IronBody| (iron.name.clone(), Piece::new(iron.body.clone(), iron.chi));
+        named.extend(self.bodies.iter().map(body));
+        let core = |(coil, piece)| (format!("the core of coil {coil}"), piece);
+        named.extend(Piece::cores(coils).enumerate().map(core));
+        Ok(named)
+    }
+
+    fn check(&self, coils: Coils<'_>) -> Result<(), RunError> {
+        let named = self.named(coils)?;
+        let joins = |a: usize, b: usize| contact(&named[a].1, &named[b].1) >= Contact::Face;
+        let groups = connected(named.len(), joins);
+        for (number, (name, piece)) in named.iter().enumerate() {
+            if piece.core.is_some() {
+                break;
+            }
+            for (coil, [x, y]) in coils.positions_m.iter().enumerate() {
+                let length_m = coils.winding.length_m;
+                let room = Body {
+                    solid: Solid::Tube([0.0, coils.winding.outer_radius_m, length_m]),
+                    centre_m: [*x, *y, -0.5 * length_m],
+                    turn: UPRIGHT,
+                };
+                if let Some(at) = meeting_m(&piece.body, &room, 0.0) {
                     return Err(RunError::Input(format!(
                         "{name} cuts the winding of coil {coil} or its bore, whose steel is [core], at {}; move it or \
                          make it smaller",
                         place_mm(at)
                     )));
                 }
-                let Some(shape) = core else { continue };
-                let own = full(*axis, shape.radius_m, shape.bottom_m, shape.top_m);
-                let least = LEAST_GAP * shape.radius_m;
-                let joined = *name == "[plate]"
-                    && self
-                        .plate
-                        .as_ref()
-                        .is_some_and(|plate| plate.top_m == shape.bottom_m);
-                if joined {
-                    continue;
-                }
-                if let Some(at) = meeting_m(body, &own, least) {
+            }
+            for (other, (second_name, second)) in named.iter().enumerate().skip(number + 1) {
+                let touch = contact(piece, second);
+                if touch == Contact::Volume && piece.chi != second.chi {
                     return Err(RunError::Input(format!(
-                        "{name} is less than {:.3} mm from the core of coil {coil}, or in it, at {}: closer steel is \
-                         not resolved, and only [plate] with gap_mm = 0 joins the cores",
-                        least * 1e3,
-                        place_mm(at)
+                        "{name} and {second_name} overlap and are of different steels: let them touch, or give both one \
+                         relative_permeability"
                     )));
                 }
-            }
-            for (other, (second_name, second)) in all[..number].iter().enumerate() {
-                let own =
-                    |group: &Vec<usize>, k: usize| k >= before && group.contains(&(k - before));
-                let one = |group: &Vec<usize>| own(group, number) && own(group, other);
-                if self.joined.iter().any(one) && contact(body, second) != Contact::None {
+                // What touches along a line may be filled by a third.
+                let one = |group: &Vec<usize>| group.contains(&number) && group.contains(&other);
+                if touch != Contact::None && groups.iter().any(one) {
                     continue;
                 }
-                let least = LEAST_GAP * body.thickness_m().min(second.thickness_m());
-                if let Some(at) = meeting_m(body, second, least) {
+                let least = LEAST_GAP * piece.body.thickness_m().min(second.body.thickness_m());
+                if let Some(at) = meeting_m(&piece.body, &second.body, least) {
                     return Err(RunError::Input(format!(
                         "{name} and {second_name} are less than {:.3} mm apart or overlap, at {}: closer steel is not \
-                         resolved. Joined are cores with [plate], and boxes of [[iron]] with parallel sides that touch; \
-                         export other bodies that touch as one united mesh (shape = \"mesh\")",
+                         resolved. Joined are boxes, cylinders, tubes, [plate] and cores that are upright about one \
+                         direction; export other bodies that touch as one united mesh (shape = \"mesh\")",
                         least * 1e3,
                         place_mm(at)
                     )));
                 }
             }
         }
-        Ok(())
+        solid(coils, &named).map(drop)
     }
 
     /// The windings, and it with the cores of `scene`.
     ///
     /// # Errors
-    /// A core beside the plate.
+    /// Steel that touches in a way that is not solved.
     pub(super) fn bodies<'a>(&self, scene: &Scene<'a>) -> Result<(Coils<'a>, Iron), RunError> {
-        let coils = Coils {
-            winding: scene.winding,
-            positions_m: &scene.design.array.positions_m,
-            core: (scene.core.as_ref())
-                .map(|core| (core.shape, core.relative_permeability() - 1.0)),
-        };
-        let iron = Iron::new(coils, self.plate.as_ref());
-        let mut iron =
-            iron.map_err(|fault| RunError::Input(format!("[plate]: {fault}; {}", advice(&fault))))?;
-        // A body with the permeability of air is left out.
-        let own = |k: &usize| (self.bodies[*k].body.clone(), self.bodies[*k].chi);
-        let of_steel = |group: &Vec<usize>| {
-            let bodies = group.iter().map(own).filter(|(_, chi)| *chi > 0.0);
-            bodies.collect::<Vec<(Body, f64)>>()
-        };
-        let groups: Vec<_> = self.joined.iter().map(of_steel).collect();
-        let groups: Vec<_> = groups.into_iter().filter(|own| !own.is_empty()).collect();
-        let planes_m = iron.planes_m;
-        let mirrors = [0, 1].map(|axis| is_mirrored(&groups, axis, planes_m[axis]));
-        let cuts_m = [0, 1].map(|axis| mirrors[axis].then_some(planes_m[axis]));
-        for group in &groups {
-            let faces = match &group[0] {
-                (body, _) if matches!(body.solid, Solid::Box(_)) => {
-                    box_union::joined(group, cuts_m)
-                }
-                (body, chi) => {
-                    let faces = body.faces().into_iter();
-                    faces.map(|face| face.of_steel(*chi)).collect()
-                }
-            };
-            iron = iron.with_joined(faces, mirrors);
-        }
+        let coils = coils(scene.design, &scene.winding, scene.core.as_ref());
+        let iron = solid(coils, &self.named(coils)?)?;
         Ok((coils, iron))
     }
 
     /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` up.
     ///
     /// # Errors
-    /// A core beside the plate; a node on a winding's edge; more steel than memory allows.
+    /// Steel that touches in a way that is not solved; a node on a winding's edge; more steel than memory allows.
     pub(super) fn solve(
         &self,
         scene: &Scene,
@@ -326,13 +290,42 @@ impl SceneIron {
     }
 }
 
-fn advice(fault: &Fault) -> &'static str {
-    match fault {
-        Fault::BesidePlate(_) => "make it larger",
-        Fault::HoleAtEdge { .. } | Fault::HoleAtFoot { .. } | Fault::HolesMeet { .. } => {
-            "move the hole or make it smaller: what is left between is not resolved"
-        }
+/// The windings of a design and their cores.
+fn coils<'a>(design: &'a Design, winding: &Winding, core: Option<&SceneCore>) -> Coils<'a> {
+    Coils {
+        winding: *winding,
+        positions_m: &design.array.positions_m,
+        core: core.map(|core| (core.shape, core.relative_permeability() - 1.0)),
     }
+}
+
+/// The steel of `named` about the windings of `coils`, joined.
+fn solid(coils: Coils<'_>, named: &[(String, Piece)]) -> Result<Iron, RunError> {
+    let pieces = named.iter().map(|(_, piece)| piece);
+    // Steel with the permeability of air is left out.
+    let pieces: Vec<Piece> = pieces.filter(|piece| piece.chi > 0.0).cloned().collect();
+    Iron::of(coils, &pieces).map_err(|fault| refused(fault, named))
+}
+
+/// Why `named` steel is not solved, and what to do.
+fn refused(fault: Fault, named: &[(String, Piece)]) -> RunError {
+    let (whose, advice) = match fault {
+        Fault::Crosses(site) => (
+            named
+                .iter()
+                .find(|(_, piece)| piece.is_about(&site))
+                .map(|(name, _)| name.as_str()),
+            "make what it touches larger or smaller, or move it",
+        ),
+        Fault::Loop(_) => (None, "leave a gap, of air or of relative_permeability = 1"),
+        Fault::Askew => (None, "export them as one united mesh (shape = \"mesh\")"),
+        Fault::HoleAtEdge { .. } | Fault::HoleAtFoot { .. } | Fault::HolesMeet { .. } => (
+            Some("[plate]"),
+            "move the hole or make it smaller: what is left between is not resolved",
+        ),
+    };
+    let whose = whose.unwrap_or("[plate] or [[iron]]");
+    RunError::Input(format!("{whose}: {fault}; {advice}"))
 }
 
 fn site(hole: &Hole) -> Site {
@@ -423,42 +416,6 @@ fn bodies_of(
             [-sb, cb * sa, cb * ca],
         ],
     }])
-}
-
-/// Bodies by their numbers, those that hang together in one entry.
-///
-/// # Errors
-/// Boxes that touch along a line alone, or overlap and are of different steels.
-fn joined(bodies: &[IronBody]) -> Result<Vec<Vec<usize>>, RunError> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (number, own) in bodies.iter().enumerate() {
-        let mut group = vec![number];
-        for (other, second) in bodies[..number].iter().enumerate() {
-            let (a, b) = (&own.name, &second.name);
-            match contact(&own.body, &second.body) {
-                Contact::None => continue,
-                Contact::Volume if own.chi != second.chi => {
-                    return Err(RunError::Input(format!(
-                        "{a} and {b} overlap and are of different steels: let them touch, or give both one \
-                         relative_permeability"
-                    )));
-                }
-                Contact::Face | Contact::Volume => {
-                    let at = groups.iter().position(|group| group.contains(&other));
-                    group.extend(at.map(|at| groups.swap_remove(at)).into_iter().flatten());
-                }
-                // Their corners may be filled by a third.
-                Contact::Line => {}
-            }
-        }
-        group.sort_unstable();
-        groups.push(group);
-    }
-    for group in &mut groups {
-        group.sort_unstable();
-    }
-    groups.sort_unstable();
-    Ok(groups)
 }
 
 /// `(1.0, 2.5, -3.0) mm`.

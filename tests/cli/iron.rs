@@ -347,6 +347,42 @@ fn a_mesh_counts_as_the_body_that_it_bounds() {
     assert!((peaks[0] / peaks[1] - 1.0).abs() < 0.05, "{peaks:?}");
 }
 
+/// A bar below the cores is a plate; caps on the cores and posts on the bar are joined to them, and take flux with them.
+#[test]
+fn what_touches_cores_is_joined_to_them() {
+    let place = Place::new();
+    let bar = format!(
+        "{CORE}[[iron]]\nshape = \"box\"\nsize_mm = [70, 40, 4]\ncenter_mm = [0, 0, -36]\n"
+    );
+    let [plate, bar_alone] = [PLATE, &bar].map(|more| inductance_h(&evaluated(&place, more)));
+    assert!(
+        (plate / bar_alone - 1.0).abs() < 1e-2,
+        "{plate} {bar_alone}"
+    );
+    let cylinder = |diameter: f64, length: f64, at: &str| {
+        format!(
+            "[[iron]]\nshape = \"cylinder\"\ndiameter_mm = {diameter}\nlength_mm = {length}\n\
+             center_mm = {at}\n"
+        )
+    };
+    let caps = cylinder(20.0, 2.0, "[-16.5, 0, 1]") + &cylinder(20.0, 2.0, "[16.5, 0, 1]");
+    let posts = cylinder(8.0, 34.0, "[0, 14, -17]") + &cylinder(8.0, 34.0, "[0, -14, -17]");
+    let capped = inductance_h(&evaluated(&place, &format!("{bar}{caps}{posts}")));
+    assert!(capped > 1.05 * bar_alone, "{capped} {bar_alone}");
+    let pot = "[[iron]]\nshape = \"tube\"\ndiameter_mm = 30\ninner_diameter_mm = 24\nlength_mm = 35\n\
+               center_mm = [16.5, 0, -16.5]\n";
+    let lid = cylinder(30.0, 2.0, "[16.5, 0, 2]");
+    let rod = "[core]\nbelow_mm = 4.0\nabove_mm = 1.0\n";
+    refused(
+        &place,
+        &format!("{}{pot}{lid}", bar.replace(CORE, rod)),
+        &[
+            "the core of coil 1 closes a loop through its winding",
+            "leave a gap",
+        ],
+    );
+}
+
 /// Two bars end to end on a third, touching and overlapping, are as one body that is nowhere cut.
 #[test]
 fn boxes_that_touch_are_joined() {
@@ -372,7 +408,7 @@ fn boxes_that_touch_are_joined() {
     refused(
         &place,
         &format!("{CORE}{}{}{other}", parts[0], parts[1]),
-        &["[[iron]] 1 and [[iron]] 0 overlap and are of different steels"],
+        &["[[iron]] 0 and [[iron]] 1 overlap and are of different steels"],
     );
 }
 
@@ -474,7 +510,7 @@ fn a_mesh_that_cannot_be_is_refused_with_its_place() {
         &mesh("").replace("-40]", "-35]"),
         &[
             "[[iron]] 0",
-            "from the core of coil",
+            "and the core of coil",
             "mm: closer steel is not resolved",
         ],
     );
@@ -487,7 +523,7 @@ fn a_mesh_that_cannot_be_is_refused_with_its_place() {
     refused(
         &place,
         &mesh(&other),
-        &["[[iron]] 1 and [[iron]] 0 are less than", "one united mesh"],
+        &["[[iron]] 0 and [[iron]] 1 are less than", "one united mesh"],
     );
     // Above the coils, where the finger's magnet is.
     let roof = mesh("").replace("-40]", "20]");
@@ -546,7 +582,10 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
     refused(
         &place,
         &PLATE.replace("70.0", "40.0"),
-        &["not wholly above the plate"],
+        &[
+            "the core of coil 0: the circle of 14.000 mm",
+            "crosses an edge",
+        ],
     );
     refused(
         &place,

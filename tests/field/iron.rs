@@ -263,17 +263,17 @@ fn a_core_on_a_round_plate_is_as_axisymmetric_elements_have_it() {
     assert!(off < 1e-4, "{whole} H, off by {off:e}");
 }
 
+/// A core may be wholly beside the plate, not half on it.
 #[test]
-fn a_core_beside_the_plate_is_refused() {
-    let small = plate(
-        Outline::Rectangle([0.11, 0.15]),
-        SHAPE.bottom_m,
-        0.005,
-        999.0,
-    );
+fn a_core_across_the_plate_s_edge_is_refused() {
     let positions_m = grid();
-    let fault = Iron::new(coils(&positions_m, 999.0), Some(&small));
-    assert_eq!(fault, Err(Fault::BesidePlate(0)));
+    let on = |x_m: f64| {
+        let outline = Outline::Rectangle([x_m, 0.15]);
+        let small = plate(outline, SHAPE.bottom_m, 0.005, 999.0);
+        Iron::new(coils(&positions_m, 999.0), Some(&small))
+    };
+    assert!(matches!(on(0.11), Err(Fault::Crosses(foot)) if foot.radius_m == SHAPE.radius_m));
+    assert!(on(0.07).is_ok());
 }
 
 /// What memory does not hold is refused before it is built; mirrors make it a quarter.

@@ -6,6 +6,7 @@ mod core_field;
 mod iron;
 mod iron_bodies;
 mod iron_closed_forms;
+mod iron_joined;
 mod iron_passive;
 mod magnet;
 mod passive;

@@ -4,8 +4,9 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::bodies::{Coils, Iron, SAME_M};
-use super::face::{Node, Point};
+use super::bodies::{Coils, Iron};
+use super::face::{Node, Point, SAME_M};
+use super::potential::Branch;
 use super::surface::{Surface, mirrored};
 use super::system::System;
 use crate::components::Components;
@@ -351,12 +352,18 @@ fn potentials(
         let [x, y] = positions_m[*drive];
         let of_node = |(number, node): (usize, &Node)| {
             let [px, py, pz] = mirrored(node, signs, planes_m).place_m;
-            let bore = surface.face_of(number).bore;
-            let in_bore =
-                bore.is_some_and(|own| moved(positions_m, own, signs, planes_m) == *drive);
+            let face = surface.face_of(number);
+            let is_driven = |own: &usize| moved(positions_m, *own, signs, planes_m) == *drive;
+            let branch = if face.above.iter().any(is_driven) {
+                Branch::Above
+            } else if face.bore.as_ref().is_some_and(is_driven) {
+                Branch::Bore
+            } else {
+                Branch::Outside
+            };
             coils
                 .winding
-                .potential((px - x).hypot(py - y), pz, in_bore, POTENTIAL)
+                .potential((px - x).hypot(py - y), pz, branch, POTENTIAL)
         };
         let nodes = surface.nodes.par_iter().enumerate();
         nodes.map(of_node).collect::<Vec<f64>>()

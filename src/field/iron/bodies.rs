@@ -1,20 +1,17 @@
 //! Bodies of steel as faces: cores, a plate that joins them, boxes, cylinders, tubes, meshes.
 
-use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use super::face::{Curve, Face, Point, Resolution};
+use super::arrangement;
+use super::face::{Face, Point, Resolution, SAME_M};
 use super::mesh_body::MeshBody;
-use super::plate::{Cell, beyond, check_holes, is_apart};
-pub use super::plate::{Fault, Outline, Plate, Site};
+pub use super::plate::{Fault, Outline, Plate};
+pub use super::prisms::Contact;
+use super::prisms::{self, Prism, connected, is_mirrored};
+pub use super::round_faces::Site;
 use crate::steel::CoreShape;
 use crate::winding::Winding;
 use fluxform_numerics::vec3::{dot, minus};
-
-pub(super) use super::plate::SAME_M;
-
-const UP: Point = [0.0, 0.0, 1.0];
-const DOWN: Point = [0.0, 0.0, -1.0];
 
 /// A body's shape about its middle.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,15 +73,35 @@ impl Body {
     /// Its surface.
     #[must_use]
     pub fn faces(&self) -> Vec<Face> {
+        let turn = |p: Point| self.turn.map(|row| dot(row, p));
+        let moved = |face: Face| face.moved(turn, self.centre_m);
         let faces = match &self.solid {
-            Solid::Box(sides) => cuboid(*sides),
-            Solid::Tube([inner, outer, length]) => tube(*inner, *outer, *length),
+            Solid::Box(_) | Solid::Tube(_) => {
+                let whole = Body {
+                    centre_m: [0.0; 3],
+                    turn: UPRIGHT,
+                    ..self.clone()
+                };
+                let prism = Piece::new(whole, 1.0).prism(&UPRIGHT);
+                let prism = prism.expect("boxes and tubes are prisms of their own frame");
+                let faces = arrangement::faces(&[prism], [None; 2], [0.0; 2]);
+                let faces = faces.expect("one body crosses no other");
+                faces.into_iter().map(|(face, _)| face).collect()
+            }
             Solid::Ball(radius) => Face::ball([0.0; 3], [*radius; 3]),
             Solid::Mesh(mesh) => mesh.faces(),
         };
-        let turn = |p: Point| self.turn.map(|row| dot(row, p));
-        let moved = |face: Face| face.moved(turn, self.centre_m);
         faces.into_iter().map(moved).collect()
+    }
+
+    /// A core on an axis.
+    #[must_use]
+    pub fn of_core(shape: CoreShape, [x, y]: [f64; 2]) -> Self {
+        Self {
+            solid: Solid::Tube([0.0, shape.radius_m, shape.length_m()]),
+            centre_m: [x, y, 0.5 * (shape.bottom_m + shape.top_m)],
+            turn: UPRIGHT,
+        }
     }
 
     /// The least that any two of its opposite sides are apart, m.
@@ -178,6 +195,198 @@ impl Coils<'_> {
     }
 }
 
+/// A body of one steel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// Its shape and place.
+    pub body: Body,
+    /// Relative permeability less one.
+    pub chi: f64,
+    /// Holes through it along z, if it is upright.
+    pub holes: Vec<Site>,
+    /// Discs about which its ends are cut more finely, if it is upright.
+    pub marks: Vec<Site>,
+    /// The coil whose core it is.
+    pub core: Option<usize>,
+}
+
+impl Piece {
+    /// A body without holes.
+    #[must_use]
+    pub fn new(body: Body, chi: f64) -> Self {
+        Self {
+            body,
+            chi,
+            holes: Vec::new(),
+            marks: Vec::new(),
+            core: None,
+        }
+    }
+
+    /// A plate below `coils`, its ends cut below their axes.
+    ///
+    /// # Errors
+    /// [`Fault`]: its holes.
+    pub fn plate(plate: &Plate, coils: Coils<'_>) -> Result<Self, Fault> {
+        let radius_m = coils.radius_m();
+        let below = |at: &[f64; 2]| Site {
+            at_m: *at,
+            radius_m,
+        };
+        let marks: Vec<Site> = coils.positions_m.iter().map(below).collect();
+        let stand = |(shape, _): &(CoreShape, f64)| (shape.bottom_m - plate.top_m).abs() < SAME_M;
+        let feet = if coils.core.as_ref().is_some_and(stand) {
+            &marks[..]
+        } else {
+            &[]
+        };
+        plate.check_holes(feet)?;
+        Ok(Self {
+            holes: plate.holes.clone(),
+            marks,
+            ..Self::new(plate.body(), plate.chi)
+        })
+    }
+
+    /// The cores of `coils`.
+    pub fn cores(coils: Coils<'_>) -> impl Iterator<Item = Self> {
+        let of = move |(shape, chi): (CoreShape, f64)| {
+            let core = move |(number, [x, y]): (usize, &[f64; 2])| Self {
+                core: Some(number),
+                ..Self::new(Body::of_core(shape, [*x, *y]), chi)
+            };
+            coils.positions_m.iter().enumerate().map(core)
+        };
+        coils.core.into_iter().flat_map(of)
+    }
+
+    /// Whether a circle in plan is its own.
+    #[must_use]
+    pub fn is_about(&self, site: &Site) -> bool {
+        let disc = self.prism(&UPRIGHT).and_then(|prism| prism.disc());
+        disc.is_some_and(|disc| disc.is(site)) || self.holes.iter().any(|hole| hole.is(site))
+    }
+
+    /// It as a prism along the z of a frame.
+    fn prism(&self, frame: &[Point; 3]) -> Option<Prism> {
+        let column = |of: &[Point; 3], k: usize| -> Point { [of[0][k], of[1][k], of[2][k]] };
+        let share =
+            |k: usize, own: usize| dot(column(frame, k), column(&self.body.turn, own)).abs();
+        let [x, y, z] = [0, 1, 2].map(|k| dot(column(frame, k), self.body.centre_m));
+        let (outline, hole, height) = match self.body.solid {
+            Solid::Box(sides) => {
+                let mut along = [0.0; 3];
+                for (k, along) in along.iter_mut().enumerate() {
+                    for (own, side) in sides.iter().enumerate() {
+                        let share = share(k, own);
+                        if share > SAME_TURN && share < 1.0 - SAME_TURN {
+                            return None;
+                        }
+                        *along += side * share.round();
+                    }
+                }
+                (Outline::Rectangle([along[0], along[1]]), None, along[2])
+            }
+            Solid::Tube([inner, outer, length]) if share(2, 2) > 1.0 - SAME_TURN => {
+                (Outline::Round(2.0 * outer), Some(inner), length)
+            }
+            Solid::Tube(_) | Solid::Ball(_) | Solid::Mesh(_) => return None,
+        };
+        let in_frame = |site: &Site| {
+            let [x, y] = site.at_m;
+            Site {
+                at_m: [0, 1].map(|k| dot(column(frame, k), [x, y, 0.0])),
+                ..*site
+            }
+        };
+        let bore = hole.filter(|radius| *radius > 0.0).map(|radius_m| Site {
+            at_m: [x, y],
+            radius_m,
+        });
+        Some(Prism {
+            outline,
+            centre_m: [x, y],
+            heights_m: [z - 0.5 * height, z + 0.5 * height],
+            holes: self.holes.iter().map(in_frame).chain(bore).collect(),
+            marks: self.marks.iter().map(in_frame).collect(),
+            chi: self.chi,
+            core: self.core,
+        })
+    }
+}
+
+/// Rotations that differ by less are one.
+const SAME_TURN: f64 = 1e-9;
+
+/// Both as prisms of one frame, if they are.
+fn prisms_of(a: &Piece, b: &Piece) -> Option<(Prism, Prism)> {
+    let frames = [&UPRIGHT, &a.body.turn, &b.body.turn];
+    let of = |frame| Some((a.prism(frame)?, b.prism(frame)?));
+    frames.into_iter().find_map(of)
+}
+
+/// How two bodies touch, if both have upright sides in one frame.
+#[must_use]
+pub fn contact(a: &Piece, b: &Piece) -> Contact {
+    prisms_of(a, b).map_or(Contact::None, |(a, b)| prisms::contact(&a, &b))
+}
+
+/// Bodies that hang together.
+enum Part {
+    /// With upright sides in the frame of a rotation.
+    Prisms([Point; 3], Vec<Prism>),
+    /// One of any shape.
+    Alone(Vec<Face>),
+}
+
+impl Part {
+    fn new(pieces: &[&Piece]) -> Result<Self, Fault> {
+        let turns = pieces.iter().map(|piece| &piece.body.turn);
+        let prisms = |frame: &[Point; 3]| {
+            let prisms: Option<Vec<Prism>> = pieces.iter().map(|p| p.prism(frame)).collect();
+            Some(Self::Prisms(*frame, prisms?))
+        };
+        let known = std::iter::once(&UPRIGHT).chain(turns).find_map(prisms);
+        match (known, pieces) {
+            (Some(part), _) => Ok(part),
+            (None, [piece]) => {
+                let faces = piece.body.faces().into_iter();
+                Ok(Self::Alone(
+                    faces.map(|face| face.of_steel(piece.chi)).collect(),
+                ))
+            }
+            (None, _) => Err(Fault::Askew),
+        }
+    }
+
+    fn upright(&self) -> Option<&[Prism]> {
+        match self {
+            Self::Prisms(frame, prisms) if *frame == UPRIGHT => Some(prisms),
+            Self::Prisms(..) | Self::Alone(_) => None,
+        }
+    }
+
+    /// Its faces; upright ones do not cross the planes x = and y = `cuts_m`.
+    fn faces(&self, coils: Coils<'_>, cuts_m: [Option<f64>; 2]) -> Result<Vec<Face>, Fault> {
+        let (frame, prisms) = match self {
+            Self::Prisms(frame, prisms) => (frame, prisms),
+            Self::Alone(faces) => return Ok(faces.clone()),
+        };
+        let cuts_m = cuts_m.map(|cut| cut.filter(|_| *frame == UPRIGHT));
+        // Frames of cores are upright or upside down.
+        let ends_m = [-coils.winding.length_m, 0.0].map(|z| frame[2][2] * z);
+        let above = prisms::above_cores(prisms, 0.5 * (ends_m[0] + ends_m[1]), frame[2][2])?;
+        let turn = |p: Point| frame.map(|row| dot(row, p));
+        let bounds = arrangement::faces(prisms, cuts_m, ends_m)?.into_iter();
+        let placed = |(mut face, number): (Face, usize)| {
+            face.bore = prisms[number].core;
+            face.above.clone_from(&above[number]);
+            face.moved(turn, [0.0; 3])
+        };
+        Ok(bounds.map(placed).collect())
+    }
+}
+
 /// Bodies, and what is known of their symmetry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iron {
@@ -197,29 +406,40 @@ impl Iron {
     /// # Errors
     /// [`Fault`].
     pub fn new(coils: Coils<'_>, plate: Option<&Plate>) -> Result<Self, Fault> {
-        let about = plate.map_or_else(|| middle(coils.positions_m), |plate| plate.centre_m);
-        let mut iron = Self {
-            planes_m: about,
-            mirrors: [0, 1].map(|axis| {
-                let mirrored = |mut place: [f64; 2]| {
-                    place[axis] = -place[axis];
-                    place
-                };
-                is_mirrored(coils.positions_m, axis, about[axis])
-                    && plate.is_none_or(|plate| plate.keeps_holes(mirrored))
-            }),
-            ..Self::none()
-        };
-        let touching = match (coils.core, plate) {
-            (Some((shape, _)), Some(plate)) => (shape.bottom_m - plate.top_m).abs() < SAME_M,
-            _ => false,
-        };
-        if let Some(plate) = plate {
-            iron.add_plate(plate, coils, touching)?;
+        let plate = plate.map(|plate| Piece::plate(plate, coils)).transpose()?;
+        let pieces: Vec<Piece> = plate.into_iter().chain(Piece::cores(coils)).collect();
+        Self::of(coils, &pieces)
+    }
+
+    /// `pieces` about the windings of `coils`: those that touch or overlap are joined.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn of(coils: Coils<'_>, pieces: &[Piece]) -> Result<Self, Fault> {
+        let touch = |a: usize, b: usize| contact(&pieces[a], &pieces[b]) >= Contact::Face;
+        let groups = connected(pieces.len(), touch);
+        let mut parts: Vec<Part> = Vec::new();
+        for group in &groups {
+            let own: Vec<&Piece> = group.iter().map(|k| &pieces[*k]).collect();
+            parts.push(Part::new(&own)?);
         }
-        if let Some((shape, chi)) = coils.core {
-            let foot = plate.filter(|_| touching).map(|plate| plate.chi);
-            iron.add_cores(coils, shape, chi, foot);
+        let mut iron = Self::none();
+        iron.planes_m = middle(coils.positions_m);
+        let upright: Option<Vec<&[Prism]>> = parts.iter().map(Part::upright).collect();
+        iron.mirrors = [0, 1].map(|axis| {
+            let at = iron.planes_m[axis];
+            let kept = |groups: &Vec<&[Prism]>| is_mirrored(groups, axis, at);
+            is_mirrored_array(coils.positions_m, axis, at) && upright.as_ref().is_some_and(kept)
+        });
+        let cuts_m = [0, 1].map(|k| iron.mirrors[k].then_some(iron.planes_m[k]));
+        for part in &parts {
+            let faces = part.faces(coils, cuts_m)?;
+            for axis in 0..2 {
+                iron.mirrors[axis] &= !faces
+                    .iter()
+                    .any(|face| face.straddles(axis, iron.planes_m[axis]));
+            }
+            iron = iron.with_faces(faces);
         }
         Ok(iron)
     }
@@ -239,20 +459,24 @@ impl Iron {
 
     /// Adds a body of its own.
     #[must_use]
-    pub fn with(self, body: Vec<Face>, chi: f64) -> Self {
-        let body = body.into_iter().map(|face| face.of_steel(chi));
-        self.with_joined(body.collect(), [false; 2])
+    pub fn with(mut self, body: Vec<Face>, chi: f64) -> Self {
+        self.mirrors = [false; 2];
+        self.with_faces(body.into_iter().map(|face| face.of_steel(chi)).collect())
     }
 
-    /// Adds a body of several steels that hang together, whose faces have them; `mirrors`: the planes x = and y = that
-    /// none of its faces crosses, and whose mirror leaves all bodies that are added as they are.
+    /// The same, solved as a whole.
     #[must_use]
-    pub fn with_joined(mut self, body: Vec<Face>, mirrors: [bool; 2]) -> Self {
+    pub fn without_mirrors(mut self) -> Self {
+        self.mirrors = [false; 2];
+        self
+    }
+
+    /// Adds the faces of what hangs together, which have their steels.
+    fn with_faces(mut self, body: Vec<Face>) -> Self {
         let number = self.centres_m.len();
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for face in &body {
-            for (u, v) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)] {
-                let at = face.point(u, v).0;
+            for at in face.corners_m() {
                 for i in 0..3 {
                     low[i] = low[i].min(at[i]);
                     high[i] = high[i].max(at[i]);
@@ -265,103 +489,11 @@ impl Iron {
         self.top_m = self.top_m.max(high[2]);
         self.centres_m
             .push([0, 1].map(|i| 0.5 * (low[i] + high[i])));
-        for (own, kept) in self.mirrors.iter_mut().zip(mirrors) {
-            *own &= kept;
-        }
         self.faces.extend(body.into_iter().map(|mut face| {
             face.body = number;
             face
         }));
         self
-    }
-
-    fn add_plate(&mut self, plate: &Plate, coils: Coils<'_>, touching: bool) -> Result<(), Fault> {
-        let body = self.centres_m.len();
-        self.centres_m.push(plate.centre_m);
-        let bottom_m = plate.top_m - plate.thickness_m;
-        let extent = match plate.outline {
-            Outline::Rectangle([a, b]) => a.max(b),
-            Outline::Round(diameter) => diameter,
-        };
-        self.largest_m = self.largest_m.max(extent);
-        self.top_m = self.top_m.max(plate.top_m);
-        let radius_m = coils.radius_m();
-        let mut faces = plate_sides(plate);
-        let mut sites = Vec::new();
-        for (number, at_m) in coils.positions_m.iter().enumerate() {
-            if !plate.contains(*at_m, radius_m + SAME_M) {
-                return Err(Fault::BesidePlate(number));
-            }
-            sites.push(Site {
-                at_m: *at_m,
-                radius_m,
-            });
-        }
-        check_holes(plate, touching.then_some(&sites))?;
-        // Where no core stands, a disc only serves to cut the plate.
-        let clear = |site: &Site| plate.holes.iter().all(|hole| is_apart(hole, site));
-        sites.retain(|site| touching || clear(site));
-        let discs = sites.len();
-        sites.extend(&plate.holes);
-        for (number, site) in sites.iter().enumerate() {
-            let cell = Cell::new(plate, &sites, number);
-            let is_hole = number >= discs;
-            faces.extend(cell.ring(site, plate.top_m, UP, touching || is_hole));
-            faces.extend(cell.ring(site, bottom_m, DOWN, is_hole));
-            if is_hole {
-                let wall = cylinder_side(site.at_m, site.radius_m, [bottom_m, plate.top_m]);
-                faces.extend(wall.into_iter().map(Face::turned));
-                continue;
-            }
-            faces.extend(disc(site.at_m, site.radius_m, bottom_m, DOWN, false));
-            if !touching {
-                faces.extend(disc(site.at_m, site.radius_m, plate.top_m, UP, false));
-            }
-        }
-        self.faces.extend(faces.into_iter().map(|mut face| {
-            face.chi = [plate.chi, 0.0];
-            face.body = body;
-            face
-        }));
-        Ok(())
-    }
-
-    /// `foot`: of what they stand on, if they do.
-    fn add_cores(&mut self, coils: Coils<'_>, shape: CoreShape, chi: f64, foot: Option<f64>) {
-        self.largest_m = self
-            .largest_m
-            .max(shape.length_m())
-            .max(2.0 * shape.radius_m);
-        self.top_m = self.top_m.max(shape.top_m);
-        for (number, site) in coils.positions_m.iter().enumerate() {
-            let body = match foot {
-                Some(_) => 0,
-                None => {
-                    self.centres_m.push(*site);
-                    self.centres_m.len() - 1
-                }
-            };
-            let mut add = |faces: Vec<Face>, below: f64| {
-                self.faces.extend(faces.into_iter().map(|mut face| {
-                    face.chi = [chi, below];
-                    face.body = body;
-                    face.bore = Some(number);
-                    face
-                }));
-            };
-            let mut side = cylinder_side(*site, shape.radius_m, [shape.bottom_m, shape.top_m]);
-            for height_m in [-coils.winding.length_m, 0.0] {
-                let v = (height_m - shape.bottom_m) / shape.length_m();
-                side = side.into_iter().map(|face| face.cut(v)).collect();
-            }
-            add(side, 0.0);
-            add(disc(*site, shape.radius_m, shape.top_m, UP, true), 0.0);
-            // Steel of one kind is joined without a surface.
-            if foot != Some(chi) {
-                let end = disc(*site, shape.radius_m, shape.bottom_m, DOWN, true);
-                add(end, foot.unwrap_or(0.0));
-            }
-        }
     }
 
     /// The faces on one side of the mirrors.
@@ -433,7 +565,7 @@ fn middle(positions_m: &[[f64; 2]]) -> [f64; 2] {
     })
 }
 
-fn is_mirrored(positions_m: &[[f64; 2]], axis: usize, plane_m: f64) -> bool {
+fn is_mirrored_array(positions_m: &[[f64; 2]], axis: usize, plane_m: f64) -> bool {
     positions_m.iter().all(|place| {
         let mut image = *place;
         image[axis] = 2.0 * plane_m - image[axis];
@@ -443,118 +575,24 @@ fn is_mirrored(positions_m: &[[f64; 2]], axis: usize, plane_m: f64) -> bool {
     })
 }
 
-fn quarters() -> [[f64; 2]; 4] {
-    [0.0, 1.0, 2.0, 3.0].map(|k| [k * FRAC_PI_2, (k + 1.0) * FRAC_PI_2])
-}
-
-/// A level disc in four parts.
-fn disc([x, y]: [f64; 2], radius_m: f64, z_m: f64, normal: Point, sharp: bool) -> Vec<Face> {
-    let centre = [x, y, z_m];
-    let part = |[from, to]: [f64; 2]| {
-        Face::ruled(
-            Curve::segment(centre, centre),
-            Curve::arc(centre, radius_m, from, to),
-            [false, false, false, sharp],
-            beyond(centre, normal),
-        )
+/// The faces of one body about the origin, of no steel yet.
+fn faces_of(solid: Solid) -> Vec<Face> {
+    let body = Body {
+        solid,
+        centre_m: [0.0; 3],
+        turn: UPRIGHT,
     };
-    quarters().map(part).to_vec()
-}
-
-/// The side of an upright cylinder in four parts.
-fn cylinder_side([x, y]: [f64; 2], radius_m: f64, [low, high]: [f64; 2]) -> Vec<Face> {
-    let part = |[from, to]: [f64; 2]| {
-        let (s, c) = (0.5 * (from + to)).sin_cos();
-        Face::ruled(
-            Curve::arc([x, y, low], radius_m, from, to),
-            Curve::arc([x, y, high], radius_m, from, to),
-            [false, false, true, true],
-            beyond([x, y, 0.5 * (low + high)], [c, s, 0.0]),
-        )
-    };
-    quarters().map(part).to_vec()
-}
-
-fn plate_sides(plate: &Plate) -> Vec<Face> {
-    let heights = [plate.top_m - plate.thickness_m, plate.top_m];
-    let [cx, cy] = plate.centre_m;
-    match plate.outline {
-        Outline::Round(diameter) => cylinder_side(plate.centre_m, 0.5 * diameter, heights),
-        Outline::Rectangle([a, b]) => {
-            let (a, b) = (0.5 * a, 0.5 * b);
-            let rim = [
-                ([a, 0.0], [a, b]),
-                ([a, b], [0.0, b]),
-                ([0.0, b], [-a, b]),
-                ([-a, b], [-a, 0.0]),
-                ([-a, 0.0], [-a, -b]),
-                ([-a, -b], [0.0, -b]),
-                ([0.0, -b], [a, -b]),
-                ([a, -b], [a, 0.0]),
-            ];
-            rim.map(|(from, to)| {
-                let at = |[x, y]: [f64; 2], z: f64| [cx + x, cy + y, z];
-                let corner = |[x, y]: [f64; 2]| x != 0.0 && y != 0.0;
-                let middle = [0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1])];
-                Face::ruled(
-                    Curve::segment(at(from, heights[0]), at(to, heights[0])),
-                    Curve::segment(at(from, heights[1]), at(to, heights[1])),
-                    [corner(from), corner(to), true, true],
-                    beyond([cx, cy, heights[0]], [middle[0], middle[1], 0.0]),
-                )
-            })
-            .to_vec()
-        }
-    }
+    body.faces()
 }
 
 /// A box about the origin, sides along the axes, m.
 #[must_use]
 pub fn cuboid(sides_m: Point) -> Vec<Face> {
-    let mut faces = Vec::new();
-    for axis in 0..3 {
-        for sign in [-1.0, 1.0] {
-            let at = |u: f64, v: f64| {
-                let mut point = [0.0; 3];
-                point[axis] = 0.5 * sign * sides_m[axis];
-                point[(axis + 1) % 3] = 0.5 * u * sides_m[(axis + 1) % 3];
-                point[(axis + 2) % 3] = 0.5 * v * sides_m[(axis + 2) % 3];
-                point
-            };
-            faces.push(Face::ruled(
-                Curve::segment(at(-1.0, -1.0), at(1.0, -1.0)),
-                Curve::segment(at(-1.0, 1.0), at(1.0, 1.0)),
-                [true; 4],
-                at(0.0, 0.0).map(|x| 3.0 * x),
-            ));
-        }
-    }
-    faces
+    faces_of(Solid::Box(sides_m))
 }
 
 /// A cylinder about the origin along z, or a tube where `inner_m` is above nothing; radii and length, m.
 #[must_use]
 pub fn tube(inner_m: f64, outer_m: f64, length_m: f64) -> Vec<Face> {
-    let (low, high) = (-0.5 * length_m, 0.5 * length_m);
-    let mut faces = cylinder_side([0.0; 2], outer_m, [low, high]);
-    if inner_m > 0.0 {
-        let inside = cylinder_side([0.0; 2], inner_m, [low, high]);
-        faces.extend(inside.into_iter().map(Face::turned));
-    }
-    for (z, normal) in [(low, DOWN), (high, UP)] {
-        if inner_m > 0.0 {
-            let centre = [0.0, 0.0, z];
-            faces.extend(quarters().map(|[from, to]| {
-                Face::ruled(
-                    Curve::arc(centre, inner_m, from, to),
-                    Curve::arc(centre, outer_m, from, to),
-                    [false, false, true, true],
-                    beyond(centre, normal),
-                )
-            }));
-        } else {
-            faces.extend(disc([0.0; 2], outer_m, z, normal, true));
-        }
-    }
-    faces
+    faces_of(Solid::Tube([inner_m, outer_m, length_m]))
 }

@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use fluxform_numerics::gauss;
 use fluxform_numerics::vec3::{cross, dot, minus, norm, plus};
 
+/// Places closer than that are one, m.
+pub(super) const SAME_M: f64 = 1e-9;
+
 /// A point or a vector, m.
 pub type Point = [f64; 3];
 
@@ -117,6 +120,8 @@ pub struct Face {
     pub(super) body: usize,
     /// The coil in whose bore it lies.
     pub(super) bore: Option<usize>,
+    /// The coils through whose bores it is joined from below.
+    pub(super) above: Vec<usize>,
     /// Whether it is one of many pieces of something smooth, of which small ones need fewer nodes.
     facet: bool,
 }
@@ -160,6 +165,7 @@ impl Face {
             chi: [0.0; 2],
             body: 0,
             bore: None,
+            above: Vec::new(),
             facet: false,
         }
     }
@@ -241,6 +247,21 @@ impl Face {
             normal
         };
         (at, normal)
+    }
+
+    /// Its corners and its middle, m.
+    pub(super) fn corners_m(&self) -> [Point; 5] {
+        let places = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)];
+        places.map(|(u, v)| self.point(u, v).0)
+    }
+
+    /// Whether it is on both sides of a plane x = or y =.
+    pub(super) fn straddles(&self, axis: usize, plane_m: f64) -> bool {
+        let beyond = |sign: f64| {
+            let mut corners = self.corners_m().into_iter();
+            corners.any(|at| sign * (at[axis] - plane_m) > SAME_M)
+        };
+        beyond(1.0) && beyond(-1.0)
     }
 
     /// Whether a shape lies in a plane, on which its layer does not act.

@@ -11,15 +11,17 @@
 //! a constant layer on a closed body gives nothing outside it and is a row's diagonal. Of very permeable steel
 //! the constant is left open by the equation: it is set to a mean of nothing.
 
+mod arrangement;
 pub mod array;
 pub mod bodies;
-pub mod box_union;
 pub mod clearance;
 pub mod face;
 pub mod mesh_body;
 pub mod passive;
 pub mod plate;
 pub mod potential;
+pub mod prisms;
+mod round_faces;
 pub mod surface;
 mod system;
 pub mod uniform;

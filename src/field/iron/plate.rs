@@ -1,20 +1,7 @@
-//! A plate's outline, its holes, and how its faces are cut about feet and holes.
+//! A plate's outline and its holes, and why steel cannot be solved.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
-use super::face::{Curve, Face, Point};
-use fluxform_numerics::vec3::plus;
-
-/// Places closer than that are one, m.
-pub(super) const SAME_M: f64 = 1e-9;
-
-/// A point far out along a direction from another, m.
-pub(super) fn beyond(at: Point, along: Point) -> Point {
-    plus(at, along.map(|a| 1e3 * a))
-}
-
-/// A ring wider than this many of its inner radii is cut more finely there.
-const WIDE: f64 = 3.0;
+use super::face::SAME_M;
+use super::round_faces::Site;
 
 /// The outline of a plate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,20 +12,15 @@ pub enum Outline {
     Round(f64),
 }
 
-/// A disc in plan: a core's foot, or a hole.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Site {
-    /// Its middle, m.
-    pub at_m: [f64; 2],
-    /// Its radius, m.
-    pub radius_m: f64,
-}
-
-impl Site {
-    /// How far apart the rims of two are, m; below nothing where they cut each other.
-    fn apart_m(&self, other: &Self) -> f64 {
-        let [x, y] = [0, 1].map(|axis| self.at_m[axis] - other.at_m[axis]);
-        x.hypot(y) - self.radius_m - other.radius_m
+impl Outline {
+    pub(super) fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Rectangle(own), Self::Rectangle(other)) => {
+                (0..2).all(|k| (own[k] - other[k]).abs() < SAME_M)
+            }
+            (Self::Round(own), Self::Round(other)) => (own - other).abs() < SAME_M,
+            _ => false,
+        }
     }
 }
 
@@ -60,7 +42,7 @@ pub struct Plate {
 }
 
 impl Plate {
-    pub(super) fn contains(&self, [x, y]: [f64; 2], margin_m: f64) -> bool {
+    fn contains(&self, [x, y]: [f64; 2], margin_m: f64) -> bool {
         let (x, y) = (x - self.centre_m[0], y - self.centre_m[1]);
         match self.outline {
             Outline::Rectangle([a, b]) => {
@@ -74,9 +56,18 @@ impl Plate {
 /// Why bodies cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Fault {
-    /// A core is not wholly on the plate.
-    #[error("the core of coil {0} is not wholly above the plate")]
-    BesidePlate(usize),
+    /// Steel round a circle that is neither wholly on other steel nor wholly off it.
+    #[error(
+        "the circle of {:.3} mm about ({:.3}, {:.3}) mm crosses an edge or another circle of the steel it touches",
+        2e3 * .0.radius_m, 1e3 * .0.at_m[0], 1e3 * .0.at_m[1]
+    )]
+    Crosses(Site),
+    /// Bodies that touch, but have no common direction along which they are prisms.
+    #[error("a box or cylinder touches others that are not upright about one direction with it")]
+    Askew,
+    /// Joined steel that closes a loop through a winding.
+    #[error("the steel joined to the core of coil {0} closes a loop through its winding")]
+    Loop(usize),
     /// A hole cuts the plate's edge, or nearly.
     #[error("hole {hole} is less than {:.3} mm from the plate's edge", .least_m * 1e3)]
     HoleAtEdge {
@@ -131,172 +122,31 @@ pub(super) fn is_apart(hole: &Site, other: &Site) -> bool {
     hole.apart_m(other) >= LEAST_LEFT * hole.radius_m
 }
 
-/// `feet`: those of the cores that stand on the plate.
-pub(super) fn check_holes(plate: &Plate, feet: Option<&Vec<Site>>) -> Result<(), Fault> {
-    for (hole, site) in plate.holes.iter().enumerate() {
-        let least_m = LEAST_LEFT * site.radius_m;
-        if !plate.contains(site.at_m, site.radius_m + least_m) {
-            return Err(Fault::HoleAtEdge { hole, least_m });
-        }
-        let cut = |other: &Site| !is_apart(site, other);
-        if let Some(coil) = feet.and_then(|feet| feet.iter().position(cut)) {
-            return Err(Fault::HoleAtFoot {
-                hole,
-                coil,
-                least_m,
-            });
-        }
-        let others = &plate.holes[..hole];
-        if let Some(other) = others.iter().position(cut) {
-            return Err(Fault::HolesMeet {
-                hole,
-                other,
-                least_m,
-            });
-        }
-    }
-    Ok(())
-}
-
-/// The part of the plate nearer to one core or hole than to the others: about its axis, lines n.x = c and
-/// the plate's rim.
-pub(super) struct Cell {
-    /// n, c, and whether it is the plate's edge.
-    lines: Vec<([f64; 2], f64, bool)>,
-    /// The middle of a round plate, and its radius.
-    rim: Option<([f64; 2], f64)>,
-}
-
-impl Cell {
-    pub(super) fn new(plate: &Plate, sites: &[Site], own: usize) -> Self {
-        let [x, y] = sites[own].at_m;
-        let to_centre = [plate.centre_m[0] - x, plate.centre_m[1] - y];
-        let mut lines = Vec::new();
-        let mut rim = None;
-        match plate.outline {
-            Outline::Rectangle([a, b]) => {
-                for (normal, half) in [
-                    ([1.0, 0.0], 0.5 * a),
-                    ([-1.0, 0.0], 0.5 * a),
-                    ([0.0, 1.0], 0.5 * b),
-                    ([0.0, -1.0], 0.5 * b),
-                ] {
-                    let c = half + normal[0] * to_centre[0] + normal[1] * to_centre[1];
-                    lines.push((normal, c, true));
-                }
+impl Plate {
+    /// Refuses holes that cut its edge, each other or one of the `feet` of cores on it, or nearly.
+    pub(super) fn check_holes(&self, feet: &[Site]) -> Result<(), Fault> {
+        for (hole, site) in self.holes.iter().enumerate() {
+            let least_m = LEAST_LEFT * site.radius_m;
+            if !self.contains(site.at_m, site.radius_m + least_m) {
+                return Err(Fault::HoleAtEdge { hole, least_m });
             }
-            Outline::Round(diameter) => rim = Some((to_centre, 0.5 * diameter)),
-        }
-        for (number, other) in sites.iter().enumerate() {
-            let d = [other.at_m[0] - x, other.at_m[1] - y];
-            let long = d[0].hypot(d[1]);
-            if number != own {
-                // Tangents to both discs are as long from anywhere on the line: it passes between them.
-                let powers = sites[own].radius_m.powi(2) - other.radius_m.powi(2);
-                let offset = 0.5 * (long + powers / long);
-                lines.push(([d[0] / long, d[1] / long], offset, false));
+            let cut = |other: &Site| !is_apart(site, other);
+            if let Some(coil) = feet.iter().position(cut) {
+                return Err(Fault::HoleAtFoot {
+                    hole,
+                    coil,
+                    least_m,
+                });
+            }
+            let others = &self.holes[..hole];
+            if let Some(other) = others.iter().position(cut) {
+                return Err(Fault::HolesMeet {
+                    hole,
+                    other,
+                    least_m,
+                });
             }
         }
-        Self { lines, rim }
-    }
-
-    /// Distance of the border at an angle, m, and which line it is (as many as there are: the rim).
-    fn border(&self, angle: f64) -> (f64, usize) {
-        let (s, c) = angle.sin_cos();
-        let mut nearest = (f64::INFINITY, 0);
-        for (number, (normal, offset, _)) in self.lines.iter().enumerate() {
-            let along = normal[0] * c + normal[1] * s;
-            if along > 0.0 && offset / along < nearest.0 {
-                nearest = (offset / along, number);
-            }
-        }
-        if let Some((centre, radius)) = self.rim {
-            let along = centre[0] * c + centre[1] * s;
-            let square = radius * radius - centre[0].powi(2) - centre[1].powi(2);
-            let distance = along + (along * along + square).sqrt();
-            if distance < nearest.0 {
-                nearest = (distance, self.lines.len());
-            }
-        }
-        nearest
-    }
-
-    /// Angles between which the border is one line: the quarters, and where another takes over.
-    fn angles(&self) -> Vec<f64> {
-        let mut out: Vec<f64> = (0..=4).map(|k| f64::from(k) * FRAC_PI_2).collect();
-        let steps = 720;
-        let step = TAU / f64::from(steps);
-        for k in 0..steps {
-            // Off the quarters, so that a corner lies within.
-            let (mut low, mut high) = ((f64::from(k) + 0.37) * step, (f64::from(k) + 1.37) * step);
-            let (first, last) = (self.border(low).1, self.border(high).1);
-            if first == last {
-                continue;
-            }
-            while high - low > 1e-14 * TAU {
-                let middle = 0.5 * (low + high);
-                if middle == low || middle == high {
-                    break;
-                }
-                if self.border(middle).1 == first {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            out.push(high % TAU);
-        }
-        out.sort_by(f64::total_cmp);
-        out.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-        out
-    }
-
-    /// The cell less its disc, at a height; whether the layer changes quickly at the disc.
-    pub(super) fn ring(&self, site: &Site, z_m: f64, normal: Point, joined: bool) -> Vec<Face> {
-        let ([x, y], radius_m) = (site.at_m, site.radius_m);
-        let angles = self.angles();
-        // Far out the layer changes over the distance from the axis.
-        let widest = angles
-            .iter()
-            .fold(0.0_f64, |w, angle| w.max(self.border(*angle).0));
-        let graded = joined || widest > WIDE * radius_m;
-        let part = |pair: &[f64]| {
-            let [from, to] = [pair[0], pair[1]];
-            let line = self.border(0.5 * (from + to)).1;
-            let on_line = |angle: f64| {
-                let (s, c) = angle.sin_cos();
-                let (distance, _) = if line < self.lines.len() {
-                    let (n, offset, _) = self.lines[line];
-                    (offset / (n[0] * c + n[1] * s), line)
-                } else {
-                    self.border(angle)
-                };
-                [x + distance * c, y + distance * s, z_m]
-            };
-            let (a, b) = (on_line(from), on_line(to));
-            let edge = line >= self.lines.len() || self.lines[line].2;
-            let border = match self.rim {
-                Some((centre, radius)) if line == self.lines.len() => {
-                    let middle = [x + centre[0], y + centre[1], z_m];
-                    let angle = |p: Point| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-                    let first = angle(a);
-                    let mut turn = angle(b) - first;
-                    if turn < 0.0 {
-                        turn += TAU;
-                    }
-                    debug_assert!(turn < PI);
-                    Curve::arc(middle, radius, first, first + turn)
-                }
-                _ => Curve::segment(a, b),
-            };
-            let centre = [x, y, z_m];
-            Face::ruled(
-                Curve::arc(centre, radius_m, from, to),
-                border,
-                [false, false, graded, edge],
-                beyond(centre, normal),
-            )
-        };
-        angles.windows(2).map(part).collect()
+        Ok(())
     }
 }

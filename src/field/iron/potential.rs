@@ -10,14 +10,28 @@
 use crate::winding::Winding;
 use fluxform_numerics::gauss;
 
+/// How a place is reached from below the winding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Branch {
+    /// Round the winding.
+    Outside,
+    /// In the bore.
+    Bore,
+    /// Up through the bore, and on.
+    Above,
+}
+
 impl Winding {
     /// phi with H = -grad phi outside the winding, A per ampere, at radius `r_m` and height `z_m`, to
-    /// `tolerance` of a face's; it jumps by the turns where the bore is crossed. `in_bore`: the branch
-    /// that goes up through the bore from below, else the one that goes round the winding.
+    /// `tolerance` of a face's; it jumps by the turns where the bore is crossed.
     #[must_use]
-    pub fn potential(&self, r_m: f64, z_m: f64, in_bore: bool, tolerance: f64) -> f64 {
+    pub fn potential(&self, r_m: f64, z_m: f64, branch: Branch, tolerance: f64) -> f64 {
         let height = ((z_m + self.length_m) / self.length_m).clamp(0.0, 1.0);
-        let passed = if in_bore { self.turns * height } else { 0.0 };
+        let passed = match branch {
+            Branch::Outside => 0.0,
+            Branch::Bore => self.turns * height,
+            Branch::Above => self.turns,
+        };
         self.charged_face(r_m, z_m, tolerance)
             - self.charged_face(r_m, z_m + self.length_m, tolerance)
             - passed
@@ -67,17 +81,18 @@ mod tests {
             length_m: 1.9,
             turns: 3.7,
         };
-        for (r, z, in_bore) in [
-            (0.4, -0.8, true),
-            (0.7, -0.3, true),
-            (0.9, 0.4, false),
-            (0.3, -2.4, false),
-            (0.2, 0.3, true),
-            (2.1, -1.1, false),
+        for (r, z, branch) in [
+            (0.4, -0.8, Branch::Bore),
+            (0.7, -0.3, Branch::Bore),
+            (0.9, 0.4, Branch::Outside),
+            (0.3, -2.4, Branch::Outside),
+            (0.2, 0.3, Branch::Bore),
+            (2.1, -1.1, Branch::Outside),
+            (1.6, -0.4, Branch::Above),
         ] {
             let h = 1e-4;
             let slope = |dr: f64, dz: f64| {
-                let at = |k: f64| winding.potential(r + k * dr, z + k * dz, in_bore, 1e-12);
+                let at = |k: f64| winding.potential(r + k * dr, z + k * dz, branch, 1e-12);
                 -(at(-2.0) - 8.0 * at(-1.0) + 8.0 * at(1.0) - at(2.0)) / (12.0 * h)
             };
             let field = winding.field(r, z).unwrap();

@@ -1,0 +1,191 @@
+//! Bodies joined to cores, plates and each other, against the same steel described otherwise.
+
+use fluxform_field::iron::array::IronArray;
+use fluxform_field::iron::bodies::{
+    Body, Coils, Fault, Iron, Outline, Piece, Plate, Solid, UPRIGHT,
+};
+use fluxform_field::steel::CoreShape;
+use fluxform_field::winding::Winding;
+
+const WINDING: Winding = Winding {
+    inner_radius_m: 0.012,
+    outer_radius_m: 0.019,
+    length_m: 0.1,
+    turns: 1429.0,
+};
+const CHI: f64 = 999.0;
+const TWO: [[f64; 2]; 2] = [[-0.025, 0.0], [0.025, 0.0]];
+
+fn coils(positions_m: &[[f64; 2]], ends_m: [f64; 2]) -> Coils<'_> {
+    let shape = CoreShape {
+        radius_m: 0.012,
+        bottom_m: ends_m[0],
+        top_m: ends_m[1],
+    };
+    Coils {
+        winding: WINDING,
+        positions_m,
+        core: Some((shape, CHI)),
+    }
+}
+
+/// A box or cylinder between two heights.
+fn piece(solid: Solid, [x, y]: [f64; 2], [low, high]: [f64; 2]) -> Piece {
+    let body = Body {
+        solid,
+        centre_m: [x, y, 0.5 * (low + high)],
+        turn: UPRIGHT,
+    };
+    Piece::new(body, CHI)
+}
+
+fn cuboid(sides: [f64; 2], at: [f64; 2], heights: [f64; 2]) -> Piece {
+    let [a, b] = sides;
+    piece(Solid::Box([a, b, heights[1] - heights[0]]), at, heights)
+}
+
+fn tube(radii: [f64; 2], at: [f64; 2], heights: [f64; 2]) -> Piece {
+    let [inner, outer] = radii;
+    piece(
+        Solid::Tube([inner, outer, heights[1] - heights[0]]),
+        at,
+        heights,
+    )
+}
+
+fn iron(coils: Coils<'_>, others: &[Piece]) -> Result<Iron, Fault> {
+    let pieces: Vec<Piece> = others.iter().cloned().chain(Piece::cores(coils)).collect();
+    Iron::of(coils, &pieces)
+}
+
+fn solved(coils: Coils<'_>, others: &[Piece], tier: usize) -> IronArray {
+    let iron = iron(coils, others).unwrap();
+    IronArray::at_resolution(coils, &iron, 1e-4, tier).unwrap()
+}
+
+/// Largest difference of inductances and of fields above, relative to the largest.
+fn apart(a: &IronArray, b: &IronArray) -> f64 {
+    let inductances = (&a.added_inductance_h - &b.added_inductance_h).amax();
+    let mut worst = inductances / b.added_inductance_h.amax();
+    let currents_a = [1.3, -0.4, 0.7];
+    for place in [[0.003, 0.001, 0.03], [0.03, -0.02, 0.02]] {
+        let at = |array: &IronArray| {
+            let count = array.positions_m.len();
+            array.field_t(place, &currents_a[..count]).unwrap()
+        };
+        let (a, b) = (at(a), at(b));
+        let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        worst = worst.max(norm([0, 1, 2].map(|k| a[k] - b[k])) / norm(b));
+    }
+    worst
+}
+
+/// `[plate]`, a box in its place, and two boxes one on the other are one body.
+#[test]
+fn a_box_below_the_cores_is_a_plate() {
+    let two = coils(&TWO, [-0.11, 0.0]);
+    let plate = Plate {
+        outline: Outline::Rectangle([0.1, 0.06]),
+        centre_m: [0.0; 2],
+        top_m: -0.11,
+        thickness_m: 0.005,
+        chi: CHI,
+        holes: Vec::new(),
+    };
+    let of_plate = Iron::new(two, Some(&plate)).unwrap();
+    let of_plate = IronArray::at_resolution(two, &of_plate, 1e-4, 2).unwrap();
+    let whole = cuboid([0.1, 0.06], [0.0; 2], [-0.115, -0.11]);
+    let halves = [
+        cuboid([0.1, 0.06], [0.0; 2], [-0.1125, -0.11]),
+        cuboid([0.1, 0.06], [0.0; 2], [-0.115, -0.1125]),
+    ];
+    let of_box = solved(two, &[whole], 2);
+    let of_halves = solved(two, &halves, 2);
+    assert_eq!(of_halves.size(), of_box.size());
+    assert!(apart(&of_halves, &of_box) < 1e-9);
+    let error = apart(&of_box, &of_plate);
+    assert!(error < 1e-3, "{error}");
+}
+
+/// A core that goes through the plate to its lower side is the plate with the core on it.
+#[test]
+fn a_core_within_a_body_is_a_part_of_it() {
+    let on = solved(
+        coils(&TWO, [-0.11, 0.0]),
+        &[cuboid([0.1, 0.06], [0.0; 2], [-0.115, -0.11])],
+        2,
+    );
+    let through = solved(
+        coils(&TWO, [-0.115, 0.0]),
+        &[cuboid([0.1, 0.06], [0.0; 2], [-0.115, -0.11])],
+        2,
+    );
+    let error = apart(&through, &on);
+    assert!(error < 1e-3, "{error}");
+}
+
+/// A bar on the upper ends of cores is one on their lower ends, upside down: the turns are passed on the way to it.
+#[test]
+fn joined_above_is_joined_below_upside_down() {
+    let two = coils(&TWO, [-0.1, 0.0]);
+    let bar = |heights: [f64; 2]| cuboid([0.1, 0.05], [0.0; 2], heights);
+    let (below, above) = (
+        solved(two, &[bar([-0.105, -0.1])], 1),
+        solved(two, &[bar([0.0, 0.005])], 1),
+    );
+    let inductances = (&below.added_inductance_h - &above.added_inductance_h).amax();
+    let largest = below.added_inductance_h.amax();
+    assert!(inductances < 1e-6 * largest, "{inductances} H of {largest}");
+    assert!(above.added_inductance_h[(0, 1)] < -0.1 * largest);
+    // B_z is as large and as high above one as below the other.
+    let at = |array: &IronArray, z: f64| array.field_t([0.01, 0.004, z], &[1.0, 0.3]).unwrap();
+    let (a, b) = (at(&below, -0.13)[2], at(&above, 0.03)[2]);
+    assert!((a - b).abs() < 1e-6 * b.abs(), "{a} {b}");
+}
+
+/// A cap as wide as the core is more core.
+#[test]
+fn a_cap_on_a_core_makes_it_longer() {
+    let one = [[0.0, 0.0]];
+    let cap = tube([0.0, 0.012], [0.0; 2], [0.0, 0.008]);
+    let capped = solved(coils(&one, [-0.11, 0.0]), &[cap], 2);
+    let longer = solved(coils(&one, [-0.11, 0.008]), &[], 2);
+    let error = apart(&capped, &longer);
+    assert!(error < 1e-3, "{error}");
+}
+
+/// Posts beside the windings that stand on the plate take flux back up: the driving coil's inductance grows, and what
+/// coils share is shared both ways.
+#[test]
+fn posts_on_a_plate_return_the_flux() {
+    let two = coils(&TWO, [-0.11, 0.0]);
+    let plate = || cuboid([0.1, 0.08], [0.0; 2], [-0.115, -0.11]);
+    let post = |y: f64| tube([0.0, 0.008], [0.0, y], [-0.11, 0.0]);
+    let posts = solved(two, &[plate(), post(0.03), post(-0.03)], 1);
+    let bare = solved(two, &[plate()], 1);
+    let added = &posts.added_inductance_h;
+    assert!(
+        added[(0, 0)] > 1.02 * bare.added_inductance_h[(0, 0)],
+        "{added}"
+    );
+    assert!(
+        (added[(0, 1)] - added[(1, 0)]).abs() < 5e-3 * added.amax(),
+        "{added}"
+    );
+}
+
+/// Steel round a winding has no one potential; a gap opens the way.
+#[test]
+fn steel_that_closes_a_loop_through_a_winding_is_refused() {
+    let one = [[0.0, 0.0]];
+    let with = coils(&one, [-0.11, 0.004]);
+    let pot = |top_m: f64| {
+        [
+            cuboid([0.1; 2], [0.0; 2], [-0.115, -0.11]),
+            tube([0.025, 0.03], [0.0; 2], [-0.11, 0.004]),
+            tube([0.0, 0.03], [0.0; 2], [top_m, top_m + 0.004]),
+        ]
+    };
+    assert_eq!(iron(with, &pot(0.004)), Err(Fault::Loop(0)));
+    assert!(iron(with, &pot(0.006)).is_ok());
+}
