@@ -16,6 +16,8 @@ use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelFiel
 use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::winding::KERNEL_ERROR;
 
+/// Most points at which solutions of steel of any shape are compared.
+const IRON_SAMPLES: usize = 24;
 /// Share of the tolerance given to evaluating a solution.
 pub(crate) const EVALUATION_SHARE: f64 = 0.1;
 /// Heights above a core, in radii, from which on places are far from the steel.
@@ -120,6 +122,20 @@ impl Solved {
             return Ok(None);
         };
         Ok(Some(array.peaks(currents_a, iron.depth_m())?))
+    }
+
+    /// How far B is from that of a coarser solution at some of `points_m`, relative to |B| there; `None` where steel is
+    /// cores alone, whose error holds everywhere.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn iron_difference(&self, points_m: &[[f64; 3]]) -> Result<Option<f64>, RunError> {
+        let Some(array) = self.steel().iron() else {
+            return Ok(None);
+        };
+        let step = points_m.len().div_ceil(IRON_SAMPLES).max(1);
+        let some: Vec<_> = points_m.iter().copied().step_by(step).collect();
+        Ok(array.difference_at(&some)?)
     }
 
     /// How [`Solved::steel_error`] is known; `None` without steel.

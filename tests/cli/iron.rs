@@ -128,6 +128,18 @@ fn a_sheet_of_steel_shields_what_is_behind_it() {
     let open = fields_t(&place, CORE, behind);
     let shut = fields_t(&place, &format!("{CORE}{wall}"), behind);
     assert!(norm(shut[1]) < 0.4 * norm(open[1]), "{shut:?} {open:?}");
+    let json = [
+        "probe",
+        "design.toml",
+        "points.csv",
+        "--tolerance",
+        "0.03",
+        "--format",
+        "json",
+    ];
+    let result = place.run(&json).ends(0).json();
+    let error = result["accuracy"]["iron_at_points"]["estimate"].as_f64();
+    assert!((1e-6..0.1).contains(&error.unwrap()), "{error:?}");
 }
 
 #[test]

@@ -189,3 +189,23 @@ fn steel_that_closes_a_loop_through_a_winding_is_refused() {
     assert_eq!(iron(with, &pot(0.004)), Err(Fault::Loop(0)));
     assert!(iron(with, &pot(0.006)).is_ok());
 }
+
+/// Behind a shield, where little is left of the field, the difference from coarser panels covers the error.
+#[test]
+fn the_difference_at_places_behind_a_shield_covers_the_error() {
+    let one = [[0.0, 0.0]];
+    let with = coils(&one, [-0.11, 0.0]);
+    let floor = cuboid([0.08; 2], [0.0; 2], [-0.12, -0.116]);
+    let wall = |x: f64| cuboid([0.004, 0.08], [x, 0.0], [-0.116, 0.0]);
+    let iron = iron(with, &[floor, wall(0.038), wall(-0.038)]).unwrap();
+    let places = [[0.01, 0.0, -0.14], [0.06, 0.01, -0.05], [0.07, 0.0, -0.1]];
+    let array = IronArray::new(with, &iron, 3e-2, 0.03).unwrap();
+    let claimed = array.difference_at(&places).unwrap().unwrap();
+    let finer = IronArray::at_resolution(with, &iron, 1e-5, 3).unwrap();
+    let worst = places.iter().fold(0.0_f64, |worst, place| {
+        let [a, b] = [&array, &finer].map(|array| array.field_t(*place, &[1.0]).unwrap());
+        let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        worst.max(norm([0, 1, 2].map(|k| a[k] - b[k])) / norm(b))
+    });
+    assert!(worst < claimed && claimed < 0.3, "{worst} {claimed}");
+}

@@ -223,7 +223,13 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
         let to = "the moment times the largest |grad B| at the point's height";
         ("force", stage(estimate, to, &table.force_method))
     });
-    std::iter::once(("field", field)).chain(force).collect()
+    let iron = table.iron_difference.map(|estimate| {
+        let to = "|B| of the nearest coil at the point";
+        let how = "difference from the next coarser panels at up to 24 of the points, also beside and below the array";
+        ("iron_at_points", stage(estimate, to, how))
+    });
+    let all = [Some(("field", field)), iron, force];
+    all.into_iter().flatten().collect()
 }
 
 /// The table's columns by their names: its CSV read back, every number to the last bit.

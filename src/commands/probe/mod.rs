@@ -41,6 +41,8 @@ pub struct ProbeTable {
     pub method: String,
     /// Whether it is relative to the largest at the height.
     pub relative_to_height: bool,
+    /// With steel of any shape the largest difference of B from a coarser solution at some of the points, relative to |B|.
+    pub iron_difference: Option<f64>,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
     /// How it is known.
@@ -135,6 +137,7 @@ pub fn probe(
             evaluation = evaluation.max(proven);
         }
     }
+    let iron_difference = solved.iron_difference(&points_m)?;
     progress.end();
     let force_error = if request.force {
         let proven = (growth, evaluation);
@@ -152,6 +155,7 @@ pub fn probe(
         relative_error: solved.point_error(),
         method: solved.point_method(),
         relative_to_height: solved.has_steel(),
+        iron_difference,
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
         accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),

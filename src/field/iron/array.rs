@@ -306,6 +306,30 @@ impl IronArray {
         self.field_of(place_m, currents_a, &self.layers_at(currents_a))
     }
 
+    /// The largest difference of B from what the next coarser resolution has at `places_m`, off the surface, relative to
+    /// |B| there, each of the coil that is nearest in plan; `None` where there is no coarser one.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn difference_at(&self, places_m: &[Point]) -> Result<Option<f64>, OnEdge> {
+        let Some(coarser) = &self.coarser else {
+            return Ok(None);
+        };
+        let of_place = |place: &Point| {
+            let away = |at: &[f64; 2]| apart_m(*at, [place[0], place[1]]);
+            let nearest = self.positions_m.iter().map(away).enumerate();
+            let nearest = nearest.min_by(|a, b| a.1.total_cmp(&b.1));
+            let mut currents_a = vec![0.0; self.positions_m.len()];
+            currents_a[nearest.expect("an array has coils").0] = 1.0;
+            let fine = self.field_t(*place, &currents_a)?;
+            let coarse = coarser.field_t(*place, &currents_a)?;
+            Ok(apart(fine, coarse) / norm(fine))
+        };
+        let all = places_m.par_iter().map(of_place);
+        let all = all.collect::<Result<Vec<f64>, OnEdge>>()?;
+        Ok(Some(all.into_iter().fold(0.0, f64::max)))
+    }
+
     /// The layer of every image at these currents, A.
     fn layers_at(&self, currents_a: &[f64]) -> Vec<Vec<f64>> {
         let sum = |row: &[f64]| row.iter().zip(currents_a).map(|(v, i)| v * i).sum();
