@@ -742,8 +742,20 @@ mod tests {
                 let [u, v, w] =
                     [0.754_877, 0.569_840, 0.324_718].map(|step| (f64::from(k) * step).fract());
                 let at = [2.4 * u - 1.2, 2.4 * v - 1.2, 1.9 * w - 0.6];
-                let of = prisms.iter().find(|prism| contains(prism, at));
-                let chi = of.map_or(0.0, |prism| prism.chi);
+                let chi_at = |at: Point| {
+                    let of = prisms.iter().find(|prism| contains(prism, at));
+                    of.map_or(0.0, |prism| prism.chi)
+                };
+                let chi = chi_at(at);
+                // Next to a curved side the layer's integral is not exact.
+                let beside = (0..6).any(|k| {
+                    let mut beside = at;
+                    beside[k / 2] += if k % 2 == 0 { 3e-3 } else { -3e-3 };
+                    chi_at(beside) != chi
+                });
+                if beside {
+                    continue;
+                }
                 let mut row = vec![0.0; surface.size()];
                 surface.add_row(at, &mut row);
                 let jump = |node: usize| {

@@ -8,7 +8,7 @@ use super::bodies::{Coils, Iron};
 use super::face::{Node, Point, SAME_M};
 use super::potential::Branch;
 use super::surface::{Surface, mirrored};
-use super::system::System;
+use super::system::{System, TooMany};
 use crate::components::Components;
 use crate::frame::to_cartesian;
 use crate::steel::equivalent_dipoles::ArraySources;
@@ -26,11 +26,13 @@ pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
     (5, 6, 4, 9.0),
     (6, 8, 6, 12.0),
 ];
-/// Most entries of the dense matrices (1.6 GB).
+/// Most entries of the matrices as they are held (1.6 GB).
 pub(super) const MOST_ENTRIES: usize = 200_000_000;
+/// Most entries that are computed.
+const MOST_COMPUTED: usize = 3 * MOST_ENTRIES;
 /// A mesh of more facets does not fit, whatever its shape: two in one plane are one piece, of four nodes at the second
 /// resolution.
-pub const MOST_FACETS: usize = MOST_ENTRIES.isqrt() / 2;
+pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
 /// Steps from the best node to the largest |B|.
@@ -46,7 +48,8 @@ pub enum Unsolved {
     OnEdge(#[from] OnEdge),
     /// Its matrices are too large at the second resolution already, by which errors are estimated.
     #[error(
-        "its surface takes {unknowns} unknowns of {images} mirrored parts, {:.1} GB, at most {:.1} are given to it",
+        "its surface takes {unknowns} unknowns of {images} mirrored parts, {:.1} GB before far blocks are compressed, and \
+         at most {:.1} are given to what is left",
         gigabytes(*.images * .unknowns.pow(2)), gigabytes(MOST_ENTRIES)
     )]
     TooLarge {
@@ -66,7 +69,7 @@ fn finest(iron: &Iron) -> Result<usize, Unsolved> {
     let images = iron.images().len();
     let unknowns =
         |tier: usize| Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier])).size();
-    let fits = |tier: &usize| images * unknowns(*tier).pow(2) <= MOST_ENTRIES;
+    let fits = |tier: &usize| images * unknowns(*tier).pow(2) <= MOST_COMPUTED;
     let finest = (1..RESOLUTIONS.len()).take_while(fits).last();
     finest.ok_or_else(|| Unsolved::TooLarge {
         unknowns: unknowns(1),
@@ -121,10 +124,22 @@ impl IronArray {
         let requested = coarsest(tolerance);
         let last = finest(iron)?;
         // The error is the difference of two.
-        let first = requested.min(last - 1);
+        let mut first = requested.min(last - 1);
+        let mut fine = Self::at_resolution(coils, iron, tolerance, first + 1);
+        while first > 0 && matches!(fine, Err(Unsolved::TooLarge { .. })) {
+            first -= 1;
+            fine = Self::at_resolution(coils, iron, tolerance, first + 1);
+        }
+        let mut first_fine = Some(fine?);
         let mut coarse = Self::at_resolution(coils, iron, tolerance, first)?;
         for tier in first + 1..=last {
-            let mut fine = Self::at_resolution(coils, iron, tolerance, tier)?;
+            let next = first_fine
+                .take()
+                .map_or_else(|| Self::at_resolution(coils, iron, tolerance, tier), Ok);
+            let mut fine = match next {
+                Err(Unsolved::TooLarge { .. }) => break,
+                other => other?,
+            };
             fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
             coarse.coarser = None;
             fine.coarser = Some(Box::new(coarse));
@@ -139,19 +154,23 @@ impl IronArray {
     /// Solves at one of the [`RESOLUTIONS`].
     ///
     /// # Errors
-    /// A node on a winding's edge.
+    /// [`Unsolved`].
     pub fn at_resolution(
         coils: Coils<'_>,
         iron: &Iron,
         tolerance: f64,
         tier: usize,
-    ) -> Result<Self, OnEdge> {
+    ) -> Result<Self, Unsolved> {
         let resolution = iron.resolution(RESOLUTIONS[tier]);
         let positions_m = coils.positions_m;
         let surface = Surface::new(iron.part(), &resolution);
         let images = iron.images();
         let planes_m = iron.planes_m;
-        let system = System::new(iron, &surface, &images);
+        let system = System::new(iron, &surface, &images, tolerance, MOST_ENTRIES);
+        let system = system.map_err(|_: TooMany| Unsolved::TooLarge {
+            unknowns: surface.size(),
+            images: images.len(),
+        })?;
         let drives: Vec<Drive> = drives(positions_m, &images, planes_m);
         let firsts: Vec<usize> = (0..drives.len())
             .filter(|d| {

@@ -13,6 +13,7 @@
 
 mod arrangement;
 pub mod array;
+mod blocks;
 pub mod bodies;
 pub mod clearance;
 pub mod face;

@@ -40,7 +40,9 @@ impl Answer {
     fn new(iron: &Iron, tier: usize) -> Option<Self> {
         let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
         let images = iron.images();
-        let system = System::new(iron, &surface, &images).factored()?;
+        let system = System::new(iron, &surface, &images, 0.0, usize::MAX)
+            .ok()?
+            .factored()?;
         Some(Self {
             surface,
             images,

@@ -93,25 +93,52 @@ impl Surface {
     /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
     pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
         let mut scratch = [Vec::new(), Vec::new()];
-        for (panel, first) in self.panels.iter().zip(&self.firsts) {
-            let nodes = *first..first + panel.order * panel.order;
-            let row = &mut row[nodes.clone()];
-            let away = minus(target_m, panel.centre_m);
-            let distance = norm(away);
-            if let Some(normal) = panel.plane
-                && dot(normal, away).abs() < 1e-12 * (distance + panel.radius_m)
-            {
-                continue;
-            }
-            let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
-            if distance - panel.radius_m > FAR * half {
-                for (value, node) in row.iter_mut().zip(&self.nodes[nodes]) {
-                    *value += kernel(target_m, node);
-                }
-            } else {
-                self.add_near(target_m, panel, row, &mut scratch);
-            }
+        for panel in 0..self.panels.len() {
+            self.add_panel(
+                target_m,
+                panel,
+                &mut row[self.nodes_of(panel)],
+                &mut scratch,
+            );
         }
+    }
+
+    /// The same of the nodes of one panel.
+    pub(super) fn add_panel(
+        &self,
+        target_m: Point,
+        panel: usize,
+        row: &mut [f64],
+        scratch: &mut [Vec<f64>; 2],
+    ) {
+        let nodes = self.nodes_of(panel);
+        let panel = &self.panels[panel];
+        let away = minus(target_m, panel.centre_m);
+        let distance = norm(away);
+        if let Some(normal) = panel.plane
+            && dot(normal, away).abs() < 1e-12 * (distance + panel.radius_m)
+        {
+            return;
+        }
+        let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
+        if distance - panel.radius_m > FAR * half {
+            for (value, node) in row.iter_mut().zip(&self.nodes[nodes]) {
+                *value += kernel(target_m, node);
+            }
+        } else {
+            self.add_near(target_m, panel, row, scratch);
+        }
+    }
+
+    /// The panels, one after the other.
+    pub(super) fn panels(&self) -> &[Panel] {
+        &self.panels
+    }
+
+    /// The nodes of a panel.
+    pub(super) fn nodes_of(&self, panel: usize) -> std::ops::Range<usize> {
+        let first = self.firsts[panel];
+        first..first + self.panels[panel].order.pow(2)
     }
 
     /// Visits parts of a panel small enough for a rule of [`MORE_NODES`] more nodes to integrate the kernel

@@ -3,23 +3,36 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::blocks::{BlockRow, Blocks, Clusters, FAR};
 use super::bodies::Iron;
+use super::face::Node;
 use super::surface::{Surface, mirrored};
 use fluxform_numerics::gmres::gmres;
 use fluxform_numerics::lu::Factored;
-use fluxform_numerics::vec3::norm;
+use fluxform_numerics::vec3::{minus, norm, plus};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Most steps of the linear solver.
 const MOST_STEPS: usize = 300;
 /// Weight of the mean that is set to nothing.
 const MEAN: f64 = 0.5;
 
+/// What an entry may be off, relative to the tolerance over the number of unknowns.
+const COMPRESSION: f64 = 1e-2;
+
 /// The equations of one part of the surface, one matrix for every way to be even or odd under the mirrors.
 pub(super) struct System {
     parities: Parities,
-    /// [row][parity][column].
-    entries: Vec<f64>,
+    clusters: Clusters,
+    /// Of every parity, its diagonal left out.
+    matrices: Vec<Blocks>,
+    /// Of all of them.
+    diagonal: Vec<f64>,
 }
+
+/// The equations take more entries than allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TooMany;
 
 /// The same with its matrices factorised, for many right-hand sides.
 #[derive(Debug, Clone)]
@@ -55,9 +68,15 @@ fn sign(parity: usize, image: usize) -> f64 {
 }
 
 impl System {
-    pub(super) fn new(iron: &Iron, surface: &Surface, images: &[[f64; 2]]) -> Self {
+    /// The equations to `tolerance`, at 0 with every entry as it is, in `most_entries` at most.
+    pub(super) fn new(
+        iron: &Iron,
+        surface: &Surface,
+        images: &[[f64; 2]],
+        tolerance: f64,
+        most_entries: usize,
+    ) -> Result<Self, TooMany> {
         let (size, count) = (surface.size(), images.len());
-        let planes_m = iron.planes_m;
         let scales = iron.scales();
         let body = |node: usize| surface.face_of(node).body;
         let strengths: Vec<f64> = (0..size)
@@ -68,38 +87,68 @@ impl System {
             .collect();
         // Images that leave a body where it is.
         let keeps = |body: usize, image: usize| iron.keeps(body, images[image]);
-        let mut entries = vec![0.0; size * size * count];
-        entries
-            .par_chunks_mut(size * count)
-            .enumerate()
-            .for_each(|(row, out)| {
+        let centres: Vec<_> = surface
+            .panels()
+            .iter()
+            .map(|panel| panel.centre_m)
+            .collect();
+        let clusters = Clusters::new(&centres, |panel| surface.nodes_of(panel));
+        let threshold = COMPRESSION * tolerance / size as f64;
+        let taken = AtomicUsize::new(0);
+        let assembly = Assembly {
+            surface,
+            clusters: &clusters,
+            images,
+            planes_m: iron.planes_m,
+            strengths: &strengths,
+        };
+        let rows = (0..clusters.items.len()).into_par_iter().map(|own| {
+            let mut rows: Vec<BlockRow> = (0..count)
+                .map(|_| BlockRow::with_capacity(clusters.items.len()))
+                .collect();
+            let nodes = clusters.places(own);
+            let mut whole = vec![0.0; nodes.len()];
+            for other in 0..clusters.items.len() {
                 fluxform_base::progress::poll();
-                let own = body(row);
-                let mut whole = 0.0;
-                for (image, part) in out.chunks_exact_mut(size).enumerate() {
-                    let target = mirrored(&surface.nodes[row], images[image], planes_m);
-                    surface.add_row(target.place_m, part);
-                    for (value, strength) in part.iter_mut().zip(&strengths) {
-                        *value *= strength;
-                    }
-                    if keeps(own, image) {
-                        let same = part
-                            .iter()
-                            .enumerate()
-                            .filter(|(node, _)| body(*node) == own);
-                        whole += same.map(|(_, value)| value).sum::<f64>();
+                let parts = assembly.images_of(own, other);
+                for (image, part) in parts.iter().enumerate() {
+                    for (k, column) in clusters.places(other).iter().enumerate() {
+                        for (at, node) in nodes.iter().enumerate() {
+                            if body(*column) == body(*node) && keeps(body(*node), image) {
+                                whole[at] += part[(at, k)];
+                            }
+                        }
                     }
                 }
-                out[row] += 1.0 / scales[own] - whole;
-                let images: Vec<f64> = out.to_vec();
-                for (parity, part) in out.chunks_exact_mut(size).enumerate() {
-                    for (node, value) in part.iter_mut().enumerate() {
-                        *value = (0..count)
-                            .map(|image| sign(parity, image) * images[image * size + node])
-                            .sum();
+                let threshold = if assembly.are_apart(own, other) {
+                    threshold
+                } else {
+                    0.0
+                };
+                for (parity, row) in rows.iter_mut().enumerate() {
+                    let mut sum = parts[0].clone();
+                    for (image, part) in parts.iter().enumerate().skip(1) {
+                        sum += part * sign(parity, image);
+                    }
+                    let entries = row.push(sum, threshold);
+                    if taken.fetch_add(entries, Relaxed) + entries > most_entries {
+                        return Err(TooMany);
                     }
                 }
-            });
+            }
+            Ok((rows, whole))
+        });
+        let rows = rows.collect::<Result<Vec<_>, TooMany>>()?;
+        let mut diagonal = vec![0.0; size];
+        let mut matrices = vec![Blocks::default(); count];
+        for (cluster, (rows, whole)) in rows.into_iter().enumerate() {
+            for (node, whole) in clusters.places(cluster).iter().zip(whole) {
+                diagonal[*node] = 1.0 / scales[body(*node)] - whole;
+            }
+            for (matrix, row) in matrices.iter_mut().zip(rows) {
+                matrix.push(row);
+            }
+        }
         let bodies = scales.len();
         let constants = (0..count)
             .map(|parity| {
@@ -121,33 +170,27 @@ impl System {
                     .collect()
             })
             .collect();
-        Self {
+        Ok(Self {
             parities: Parities {
                 size,
                 images: count,
                 constants,
                 strengths,
             },
-            entries,
-        }
-    }
-
-    /// The rows of one parity's matrix.
-    fn rows(&self, parity: usize) -> impl IndexedParallelIterator<Item = &[f64]> {
-        let Parities { size, images, .. } = self.parities;
-        let rows = self.entries.par_chunks_exact(size * images);
-        rows.map(move |row| &row[parity * size..(parity + 1) * size])
+            clusters,
+            matrices,
+            diagonal,
+        })
     }
 
     fn apply(&self, parity: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
         let columns = x.ncols();
-        let rows: Vec<f64> = self
-            .rows(parity)
-            .flat_map_iter(|row| {
-                (0..columns).map(move |column| product(row, x.column(column).as_slice()))
-            })
-            .collect();
-        let mut out = DMatrix::from_row_slice(self.parities.size, columns, &rows);
+        let mut out = self.matrices[parity].apply(&self.clusters, x);
+        for (mut own, x) in out.column_iter_mut().zip(x.column_iter()) {
+            for ((own, x), diagonal) in own.iter_mut().zip(x.iter()).zip(&self.diagonal) {
+                *own += diagonal * x;
+            }
+        }
         for constant in &self.parities.constants[parity] {
             for column in 0..columns {
                 let mean: f64 = constant
@@ -180,19 +223,15 @@ impl System {
 
     /// The same equations with every parity's matrix factorised; `None` where one is singular.
     pub(super) fn factored(self) -> Option<FactoredSystem> {
-        let size = self.parities.size;
-        let factors = (0..self.parities.images)
-            .map(|parity| {
-                let mut matrix = DMatrix::zeros(size, size);
-                let columns = matrix.as_mut_slice();
-                let transposed = columns.par_chunks_mut(size.max(1)).enumerate();
-                transposed.for_each(|(column, out)| {
-                    let row_length = size * self.parities.images;
-                    let entries = &self.entries[parity * size + column..];
-                    for (value, entry) in out.iter_mut().zip(entries.iter().step_by(row_length)) {
-                        *value = *entry;
-                    }
-                });
+        let matrices = self.matrices.into_iter();
+        let factors = matrices
+            .enumerate()
+            .map(|(parity, blocks)| {
+                let mut matrix = blocks.whole(&self.clusters);
+                drop(blocks);
+                for (node, diagonal) in self.diagonal.iter().enumerate() {
+                    matrix[(node, node)] += diagonal;
+                }
                 for constant in &self.parities.constants[parity] {
                     for (row, _) in constant {
                         for (column, share) in constant {
@@ -267,17 +306,66 @@ impl Parities {
     }
 }
 
-/// The product of two vectors, in eight sums that the compiler keeps apart.
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (whole_a, whole_b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = (whole_a.remainder().iter().zip(whole_b.remainder()))
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in whole_a.zip(whole_b) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
+/// What blocks are made of.
+struct Assembly<'a> {
+    surface: &'a Surface,
+    clusters: &'a Clusters,
+    images: &'a [[f64; 2]],
+    planes_m: [f64; 2],
+    strengths: &'a [f64],
+}
+
+impl Assembly<'_> {
+    /// What the nodes of cluster `other` give at every image of those of `own`.
+    fn images_of(&self, own: usize, other: usize) -> Vec<DMatrix<f64>> {
+        let (targets, nodes) = (self.clusters.places(own), self.clusters.places(other));
+        let mut scratch = [Vec::new(), Vec::new()];
+        let mut row = vec![0.0; nodes.len()];
+        let of_image = |signs: &[f64; 2]| {
+            let mut part = DMatrix::zeros(targets.len(), nodes.len());
+            for (at, target) in targets.iter().enumerate() {
+                row.fill(0.0);
+                let target = mirrored(&self.surface.nodes[*target], *signs, self.planes_m);
+                let mut first = 0;
+                for panel in &self.clusters.items[other] {
+                    let count = self.surface.nodes_of(*panel).len();
+                    let of_panel = &mut row[first..first + count];
+                    self.surface
+                        .add_panel(target.place_m, *panel, of_panel, &mut scratch);
+                    first += count;
+                }
+                for (k, (value, node)) in row.iter().zip(nodes).enumerate() {
+                    part[(at, k)] = value * self.strengths[*node];
+                }
+            }
+            part
+        };
+        self.images.iter().map(of_image).collect()
     }
-    sums.iter().sum::<f64>() + rest
+
+    /// Whether every image of cluster `own` is far from `other`.
+    fn are_apart(&self, own: usize, other: usize) -> bool {
+        let ball = |cluster: usize| {
+            let panels = self.surface.panels();
+            let items = &self.clusters.items[cluster];
+            let mut middle = [0.0; 3];
+            for item in items {
+                middle = plus(middle, panels[*item].centre_m);
+            }
+            let middle = middle.map(|c| c / items.len() as f64);
+            let reach =
+                |item: &usize| norm(minus(panels[*item].centre_m, middle)) + panels[*item].radius_m;
+            (middle, items.iter().map(reach).fold(0.0, f64::max))
+        };
+        let ((own, a), (other, b)) = (ball(own), ball(other));
+        let image = |signs: &[f64; 2]| {
+            let node = Node {
+                place_m: own,
+                area_m2: [0.0; 3],
+            };
+            let own = mirrored(&node, *signs, self.planes_m).place_m;
+            norm(minus(own, other)) - a - b > FAR * a.max(b)
+        };
+        self.images.iter().all(image)
+    }
 }

@@ -38,7 +38,8 @@ impl InUniformField {
     #[must_use]
     pub fn of(iron: Iron, direction: Point, tier: usize) -> Self {
         let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
-        let system = System::new(&iron, &surface, &[[1.0, 1.0]]);
+        let system = System::new(&iron, &surface, &[[1.0, 1.0]], 0.0, usize::MAX);
+        let system = system.expect("there is no limit");
         let potential = surface
             .nodes
             .iter()
