@@ -8,7 +8,7 @@ use super::printer::Printer;
 use super::quantity::bytes;
 use crate::RunError;
 use crate::design::Design;
-use crate::scene::cost::{Cost, of_points, of_pull, of_steel};
+use crate::scene::cost::{Cost, of_force_constants, of_points, of_pull, of_steel};
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::ShapeSource;
 
@@ -54,10 +54,13 @@ pub fn costs(design: &Design, shapes: &[ShapeSource], tolerance: Option<f64>) ->
     let points = shapes.iter().map(|s| of_points(&s.document, coils));
     let steel = of_steel(design, tolerance);
     let pull = of_pull(design, PASSIVE_TOLERANCE);
-    points.chain(steel).chain(pull).collect()
+    let constants = shapes
+        .iter()
+        .flat_map(|shape| of_force_constants(design, &shape.document, tolerance));
+    points.chain(steel).chain(pull).chain(constants).collect()
 }
 
-/// Refuses costs that exceed the budget, and announces long ones and those that end with less
+/// Refuses costs that exceed the budget, and announces long computations and those that end with less
 /// accuracy than requested.
 ///
 /// # Errors
@@ -67,8 +70,9 @@ pub fn allow(
     origin: CostOrigin,
     printer: &Printer,
 ) -> Result<(), Failure> {
-    for cost in costs {
-        within(&cost).map_err(|message| match origin {
+    let costs: Vec<Cost> = costs.into_iter().collect();
+    for cost in &costs {
+        within(cost).map_err(|message| match origin {
             CostOrigin::Flag => Failure::Usage(message),
             CostOrigin::Document => RunError::Input(message).into(),
         })?;
@@ -79,17 +83,34 @@ pub fn allow(
                 cost.what, cost.reduce
             ));
         }
-        let seconds = cost.cpu_seconds / rayon::current_num_threads() as f64;
-        if seconds > LONG_S {
-            printer.notice(&format!(
-                "{} will take about {:.0} min and {}; Ctrl-C stops it",
-                cost.what,
-                (seconds / 60.0).ceil(),
-                bytes(cost.bytes as u64)
-            ));
-        }
+    }
+    if let Some(message) = duration(&costs, rayon::current_num_threads()) {
+        printer.notice(&message);
     }
     Ok(())
+}
+
+/// How long computations of `costs` take, if that is long, and what takes longest.
+fn duration(costs: &[Cost], threads: usize) -> Option<String> {
+    let seconds = |cost: &Cost| cost.cpu_seconds / threads as f64;
+    let minutes = |seconds: f64| format!("{:.0} min", (seconds / 60.0).ceil());
+    let total: f64 = costs.iter().map(seconds).sum();
+    let longest = costs
+        .iter()
+        .max_by(|a, b| a.cpu_seconds.total_cmp(&b.cpu_seconds))
+        .filter(|_| total > LONG_S)?;
+    let memory = if longest.bytes > 0.0 {
+        format!(" and {}", bytes(longest.bytes as u64))
+    } else {
+        String::new()
+    };
+    Some(format!(
+        "this will take about {}, most of it {} ({}{memory}); {}; Ctrl-C stops it",
+        minutes(total),
+        longest.what,
+        minutes(seconds(longest)),
+        longest.reduce
+    ))
 }
 
 /// Whether `cost` is within the budget.
@@ -161,6 +182,26 @@ fn read(path: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Stages that are short each may be long together.
+    #[test]
+    fn more_than_a_minute_is_announced_with_what_takes_longest() {
+        let cost = |what: &str, cpu_seconds: f64, bytes: f64| Cost {
+            what: what.to_owned(),
+            bytes,
+            cpu_seconds,
+            reduce: "use less",
+            misses: None,
+        };
+        let costs = [cost("one", 50.0, 0.0), cost("other", 75.0, 3e9)];
+        assert_eq!(duration(&costs, 3), None);
+        let message = duration(&costs, 2).unwrap();
+        assert_eq!(
+            message,
+            "this will take about 2 min, most of it other (1 min and 3 GB); use less; Ctrl-C stops it"
+        );
+        assert_eq!(duration(&[], 1), None);
+    }
 
     #[test]
     #[cfg(target_os = "linux")]

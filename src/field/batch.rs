@@ -81,16 +81,12 @@ impl Winding {
         if near_u <= 0.0 || !extent.z_m[1].is_finite() || !extent.r_m[1].is_finite() {
             return None;
         }
-        // Rounding: the quick B_z loses (distance / a)^2 far away and a / u close by, and the
-        // difference of the two faces loses distance / L.
         let farthest = extent.r_m[1].hypot(extent.z_m[1] + self.length_m);
-        let (a1, a2) = (self.inner_radius_m, self.outer_radius_m);
-        let middle = 0.5 * (a1 + a2);
-        let loss =
-            (farthest / middle).powi(2).max(a2 / near_u) * (farthest / self.length_m).max(1.0);
-        if loss * f64::EPSILON > ROUNDING_SHARE * tolerance {
+        if !self.keeps_digits(farthest, near_u, tolerance) {
             return None;
         }
+        let (a1, a2) = (self.inner_radius_m, self.outer_radius_m);
+        let middle = 0.5 * (a1 + a2);
         // The faces' difference is smaller than either by the winding's share of the distance.
         let tolerance = tolerance * (self.length_m / farthest).min(1.0);
         let nodes = |u: f64| {
@@ -106,6 +102,27 @@ impl Winding {
             // An error of tau counts against a^2, not against the distance's square.
             agm_steps: agm_steps(a2, near_u, tolerance * (middle / farthest).powi(2).min(1.0)),
         })
+    }
+
+    /// Whether the quick form loses few enough digits: its B_z loses (distance / a)^2 far away and a / u
+    /// close by, and the difference of the two faces loses distance / L.
+    fn keeps_digits(&self, farthest_m: f64, near_m: f64, tolerance: f64) -> bool {
+        let middle = 0.5 * (self.inner_radius_m + self.outer_radius_m);
+        let loss = (farthest_m / middle)
+            .powi(2)
+            .max(self.outer_radius_m / near_m)
+            * (farthest_m / self.length_m).max(1.0);
+        loss * f64::EPSILON <= ROUNDING_SHARE * tolerance
+    }
+
+    /// Whether points as far as `distance_m` from the axis, and not close to the winding, take the quick way.
+    #[must_use]
+    pub fn is_quick_at(&self, distance_m: f64, tolerance: f64) -> bool {
+        self.keeps_digits(
+            distance_m.hypot(self.length_m),
+            self.outer_radius_m,
+            tolerance,
+        )
     }
 
     /// Gradients per ampere at points (`r_m`, `z_m`), z above the top face, to `tolerance`

@@ -2,19 +2,24 @@
 //!
 //! The columns of forces, the heights and the offset go through one QR of
 //! `[G, h, -offset] / sqrt(n)`, its rows scaled by the roots of the points' weights; what
-//! remains has as many rows as columns. All scales are powers of two: with `2^k_i` near the norm of coil i's column,
+//! remains has as many rows as columns. Of columns far from dependent its R is that of their products
+//! in double-double. All scales are powers of two: with `2^k_i` near the norm of coil i's column,
 //! `x_i = I_i 2^(k_i - f)` and `lambda' = lambda 2^(k_h - f)`, where `2^f` newtons is
 //! the largest force within the limits. Every column then has a norm between 1 and 2.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::gram::triangular_factor_by_products;
 use fluxform_numerics::qr::{Triangle, triangular_factor};
 use fluxform_numerics::real::Real;
 
 use super::homotopy::Bounds;
 use super::model::{Factor, Model};
 use super::problem::ForceProblem;
+use super::tableau::MOST_CONDITION;
 
 /// A dependence among columns below this share of a column lies within the rounding of its entries.
 const HIDDEN_IN_ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -90,53 +95,103 @@ fn copy<T>(to: &mut [T], from: impl Iterator<Item = T>) {
     }
 }
 
+/// Rows `range` of `[G, h, -offset]`, column `j` over `2^exponents[j]`, written column by column.
+fn fill_rows<T: Real>(
+    problem: &ForceProblem,
+    exponents: &[i32],
+    range: Range<usize>,
+    block: &mut [T],
+    stride: usize,
+) {
+    let coils = problem.coils();
+    let rows = &problem.forces_n_per_a[range.start * coils..range.end * coils];
+    // Two factors: the scale of a column of tiny entries alone would overflow.
+    let factors = |k: i32| (power_of_two(-k / 2), power_of_two(-k - -k / 2));
+    for (j, (column, &k)) in block.chunks_exact_mut(stride).zip(exponents).enumerate() {
+        let (a, b) = factors(k);
+        let scaled = |v: &f64| T::of(v * a * b);
+        match (j.checked_sub(coils), problem.offset_n) {
+            (None, _) => copy(column, rows.chunks_exact(coils).map(|row| scaled(&row[j]))),
+            (Some(0), _) => copy(column, problem.height_m[range.clone()].iter().map(scaled)),
+            (_, offset) => {
+                let offset = offset.map_or(&[][..], |offset| &offset[range.clone()]);
+                copy(column, offset.iter().map(|v| -scaled(v)));
+            }
+        }
+    }
+}
+
 impl Reduced {
-    /// One pass over the points.
+    /// By reflections of the points, whatever the columns.
     pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
-        let (points, coils) = (problem.points(), problem.coils());
-        let entry_scale: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
         let heaviest = T::of(problem.heaviest());
-        // Two factors: the scale of a column of tiny entries alone would overflow.
-        let factors = |k: i32| (power_of_two(-k / 2), power_of_two(-k - -k / 2));
         let triangle: Triangle<T> =
-            triangular_factor(points, largest.len(), |range, block, stride| {
-                let rows = &problem.forces_n_per_a[range.start * coils..range.end * coils];
-                for (j, (column, &k)) in
-                    block.chunks_exact_mut(stride).zip(&entry_scale).enumerate()
-                {
-                    let (a, b) = factors(k);
-                    let scaled = |v: &f64| T::of(v * a * b);
-                    match (j.checked_sub(coils), problem.offset_n) {
-                        (None, _) => {
-                            copy(column, rows.chunks_exact(coils).map(|row| scaled(&row[j])));
-                        }
-                        (Some(0), _) => {
-                            copy(column, problem.height_m[range.clone()].iter().map(scaled))
-                        }
-                        (_, offset) => {
-                            let offset = offset.map_or(&[][..], |offset| &offset[range.clone()]);
-                            copy(column, offset.iter().map(|v| -scaled(v)));
-                        }
-                    }
-                    if let Some(weights) = problem.weights {
-                        for (entry, &weight) in column.iter_mut().zip(&weights[range.clone()]) {
-                            *entry = *entry * (T::of(weight) / heaviest).sqrt();
-                        }
+            triangular_factor(problem.points(), largest.len(), |range, block, stride| {
+                fill_rows(problem, &exponents, range.clone(), block, stride);
+                let Some(weights) = problem.weights else {
+                    return;
+                };
+                for column in block.chunks_exact_mut(stride) {
+                    for (entry, &weight) in column.iter_mut().zip(&weights[range.clone()]) {
+                        *entry = *entry * (T::of(weight) / heaviest).sqrt();
                     }
                 }
             });
         let total = match problem.weights {
-            None => Num::of(points as f64),
+            None => Num::of(problem.points() as f64),
             Some(weights) => {
                 let heaviest = Num::of(problem.heaviest());
                 let sum = |sum: Num, &w: &f64| sum + Num::of(w) / heaviest;
                 weights.iter().fold(Num::ZERO, sum)
             }
         };
+        Self::of_triangle(problem, largest, &triangle, total, T::EPSILON)
+    }
+
+    /// By the products of the columns, in double-double: quicker, for coils' columns of this condition
+    /// number. `None` where it is too large, or the heights nearly depend on them.
+    pub fn by_products(problem: &ForceProblem, largest: &[f64], condition: f64) -> Option<Self> {
+        if condition > MOST_CONDITION {
+            return None;
+        }
+        let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let unit = power_of_two(-exponent_of(problem.heaviest()));
+        let triangle = triangular_factor_by_products(
+            problem.points(),
+            largest.len(),
+            |range, block, stride| fill_rows(problem, &exponents, range, block, stride),
+            |range, to| match problem.weights {
+                None => to.fill(1.0),
+                Some(weights) => copy(to, weights[range].iter().map(|&weight| weight * unit)),
+            },
+        )?;
+        let total = match problem.weights {
+            None => Num::of(problem.points() as f64),
+            Some(weights) => {
+                let sum = |sum: Num, &w: &f64| sum + Num::of(w * unit);
+                weights.iter().fold(Num::ZERO, sum)
+            }
+        };
+        let epsilon = Num::EPSILON * condition;
+        Some(Self::of_triangle(
+            problem, largest, &triangle, total, epsilon,
+        ))
+    }
+
+    /// From R of the scaled rows, whose weights add up to `total`.
+    fn of_triangle<T: Real>(
+        problem: &ForceProblem,
+        largest: &[f64],
+        triangle: &Triangle<T>,
+        total: Num,
+        epsilon: f64,
+    ) -> Self {
+        let coils = problem.coils();
         let root = Num::ONE / total.sqrt();
         let mut scale = Vec::with_capacity(largest.len());
         let mut columns = Vec::with_capacity(largest.len());
-        for (j, k) in entry_scale.into_iter().enumerate() {
+        for (j, &most) in largest.iter().enumerate() {
             let column: Vec<Num> = triangle
                 .column(j)
                 .iter()
@@ -145,7 +200,7 @@ impl Reduced {
             let more = exponent_of(Num::dot(&column, &column).sqrt().to_f64());
             let factor = Num::of(power_of_two(-more));
             columns.push(column.into_iter().map(|v| v * factor).collect());
-            scale.push(k + more);
+            scale.push(exponent_of(most) + more);
         }
         let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
         let force_scale = (0..coils)
@@ -160,7 +215,7 @@ impl Reduced {
             coils,
             force_scale,
             lambda_scale,
-            epsilon: T::EPSILON,
+            epsilon,
         }
     }
 

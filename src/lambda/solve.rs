@@ -321,7 +321,9 @@ pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, u
             return (solved, coils, Precision::Double);
         }
     }
-    let reduced = Reduced::new::<Num>(problem, largest);
+    let reduced = condition
+        .and_then(|condition| Reduced::by_products(problem, largest, condition))
+        .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
     let solved = match condition {
         Some(_) => Solved::new(problem, reduced, condition),
         None => solve_dependent(problem, reduced),

@@ -32,7 +32,7 @@ fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// `a` as a sum of two numbers of 26 bits.
-#[inline]
+#[inline(always)]
 fn split(a: f64) -> (f64, f64) {
     let t = 134_217_729.0 * a;
     let high = t - (t - a);
@@ -40,8 +40,8 @@ fn split(a: f64) -> (f64, f64) {
 }
 
 /// `a b = p + e` exactly.
-#[inline]
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+#[inline(always)]
+pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
     let ((ah, al), (bh, bl)) = (split(a), split(b));
     (p, ((ah * bh - p) + ah * bl + al * bh) + al * bl)

@@ -12,6 +12,7 @@ pub mod dual;
 pub mod front;
 pub mod gauss;
 pub mod gmres;
+pub mod gram;
 pub mod interval;
 pub mod lagrange;
 pub mod lagrange_basis;

@@ -1,9 +1,9 @@
 //! Products of small dense matrices, row by row in memory.
 
-use super::dispatch::{self, Kernel, LANES, Lanes};
+use super::dispatch::{self, Kernel, LANES, Lanes, mul_add};
 
-/// Rows of the product that share the loads of the right factor.
-const ROWS: usize = 4;
+/// Most rows of the product that share the loads of the right factor: their sums fill the registers.
+const ROWS: usize = 6;
 
 /// `out` = `a` `b`, where `a` is (rows x inner), `b` (inner x columns); every matrix row-major.
 ///
@@ -65,42 +65,55 @@ impl Kernel for Product<'_> {
             columns,
             out,
         } = self;
-        for (a, out) in a.chunks(ROWS * inner).zip(out.chunks_mut(ROWS * columns)) {
-            if a.len() == ROWS * inner {
-                rows::<FMA, ROWS>(a, b, inner, columns, out);
-            } else {
-                for (a, out) in a.chunks(inner).zip(out.chunks_mut(columns)) {
-                    rows::<FMA, 1>(a, b, inner, columns, out);
+        let all = out.len() / columns;
+        if all == 1 {
+            for (left, row) in a.iter().zip(b.chunks_exact(columns)) {
+                for (sum, right) in out.iter_mut().zip(row) {
+                    *sum = mul_add::<FMA>(*right, *left, *sum);
                 }
+            }
+            return;
+        }
+        // As many groups as are needed, of about as many rows each.
+        let most = all.div_ceil(all.div_ceil(ROWS));
+        let mut strip = vec![Lanes::splat(0.0); inner];
+        let mut sums = vec![Lanes::splat(0.0); all];
+        for start in (0..columns).step_by(LANES) {
+            let end = (start + LANES).min(columns);
+            for (strip, row) in strip.iter_mut().zip(b.chunks_exact(columns)) {
+                *strip = Lanes::load(&row[start..end]);
+            }
+            for (sum, row) in sums.iter_mut().zip(out.chunks_exact(columns)) {
+                *sum = Lanes::load(&row[start..end]);
+            }
+            for (a, sums) in a.chunks(most * inner).zip(sums.chunks_mut(most)) {
+                match sums.len() {
+                    1 => rows::<FMA, 1>(a, &strip, sums),
+                    2 => rows::<FMA, 2>(a, &strip, sums),
+                    3 => rows::<FMA, 3>(a, &strip, sums),
+                    4 => rows::<FMA, 4>(a, &strip, sums),
+                    5 => rows::<FMA, 5>(a, &strip, sums),
+                    _ => rows::<FMA, ROWS>(a, &strip, sums),
+                }
+            }
+            for (sum, row) in sums.iter().zip(out.chunks_exact_mut(columns)) {
+                sum.store(&mut row[start..end]);
             }
         }
     }
 }
 
-/// `R` rows of the product, a vector of columns at a time.
+/// Adds `R` rows of the product: of `a`'s, each as long as the strip of `b`'s columns.
 #[inline(always)]
-fn rows<const FMA: bool, const R: usize>(
-    a: &[f64],
-    b: &[f64],
-    inner: usize,
-    columns: usize,
-    out: &mut [f64],
-) {
-    for start in (0..columns).step_by(LANES) {
-        let end = (start + LANES).min(columns);
-        let mut sums: [Lanes; R] = std::array::from_fn(|row| {
-            Lanes::load(&out[row * columns + start..row * columns + end])
-        });
-        for l in 0..inner {
-            let right = Lanes::load(&b[l * columns + start..l * columns + end]);
-            for (row, sum) in sums.iter_mut().enumerate() {
-                *sum = right.mul_add::<FMA>(Lanes::splat(a[row * inner + l]), *sum);
-            }
-        }
-        for (row, sum) in sums.into_iter().enumerate() {
-            sum.store(&mut out[row * columns + start..row * columns + end]);
+fn rows<const FMA: bool, const R: usize>(a: &[f64], strip: &[Lanes], sums: &mut [Lanes]) {
+    let a: [&[f64]; R] = std::array::from_fn(|row| &a[row * strip.len()..][..strip.len()]);
+    let mut own: [Lanes; R] = std::array::from_fn(|row| sums[row]);
+    for (l, right) in strip.iter().enumerate() {
+        for (a, sum) in a.iter().zip(&mut own) {
+            *sum = right.mul_add::<FMA>(Lanes::splat(a[l]), *sum);
         }
     }
+    sums.copy_from_slice(&own);
 }
 
 #[cfg(test)]
@@ -110,7 +123,15 @@ mod tests {
     #[test]
     fn products_of_all_shapes_are_the_plain_sums() {
         let value = |i: usize| ((i * 37 + 11) % 101) as f64 * 0.07 - 1.3;
-        for (rows, inner, columns) in [(1, 1, 1), (4, 3, 8), (5, 7, 9), (9, 2, 17), (3, 13, 31)] {
+        for (rows, inner, columns) in [
+            (1, 1, 1),
+            (4, 3, 8),
+            (5, 7, 9),
+            (9, 2, 17),
+            (3, 13, 31),
+            (13, 5, 2),
+            (6, 4, 16),
+        ] {
             let a: Vec<f64> = (0..rows * inner).map(value).collect();
             let b: Vec<f64> = (0..inner * columns).map(|i| value(i + 5)).collect();
             let mut out = vec![f64::NAN; rows * columns];

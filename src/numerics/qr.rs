@@ -32,6 +32,11 @@ impl<T: Real> Triangle<T> {
         }
     }
 
+    /// `size` columns one after another, zero below the diagonal.
+    pub(crate) fn of(size: usize, entries: Vec<T>) -> Self {
+        Self { size, entries }
+    }
+
     /// Number of rows and columns.
     #[must_use]
     pub fn size(&self) -> usize {

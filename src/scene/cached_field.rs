@@ -279,10 +279,10 @@ impl<'a> ShapeField<'a> {
             })
     }
 
-    /// The entry of what is found of the points of `document`, read from `inputs`; `what` is its name among those
+    /// The entry of what is known of the points of `document`, read from `inputs`; `what` is its name among those
     /// of that shape.
     #[must_use]
-    pub fn certificate(self, what: &str, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
+    pub fn points(self, what: &str, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
         self.of_surface(what, document, inputs, "")
     }
 

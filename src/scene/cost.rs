@@ -1,7 +1,7 @@
 //! Cost of a run in memory and time, before anything is computed.
 //!
 //! The factors are measured: peak memory of `map`, `discretize` and `lambda` at sizes where it is
-//! proportional to the work.
+//! proportional to the work, and the laws of processor time below.
 
 use super::Scene;
 use super::coupled;
@@ -24,6 +24,61 @@ const FORCE_BYTES: f64 = 32.0;
 const PROBE_VALUE_BYTES: f64 = 16.0;
 /// Operations a second of one thread on the products of a coupled array.
 const OPERATIONS_PER_S: f64 = 2e9;
+
+/// Processor time of a stage on one thread, right within a factor of about three.
+struct Law {
+    /// The stage, as messages name it.
+    stage: &'static str,
+    /// Seconds for a number of points and coils.
+    seconds: fn(f64, f64) -> f64,
+    /// What makes it shorter.
+    reduce: &'static str,
+}
+
+const FEWER: &str = "fewer points or coils take less";
+/// By batches, in air (`fluxform-bench --scaling --law forces:points`).
+const FORCES: Law = Law {
+    stage: "the forces",
+    seconds: |points, coils| 6e-8 * points * coils,
+    reduce: FEWER,
+};
+/// Of coils so far that batches would lose digits (`--law forces:coils`).
+const FORCES_FROM_FAR: Law = Law {
+    seconds: |points, coils| 2.5e-6 * points * coils,
+    reduce: "fewer points or coils, or a --tolerance of 1e-9, take less",
+    ..FORCES
+};
+/// `--law "forces, coupled:points"`.
+const FORCES_OF_STEEL: Law = Law {
+    seconds: |points, coils| STEEL_POINT_COIL_S * points * coils,
+    ..FORCES
+};
+/// `--law lambda-path:points --law lambda-path:coils`.
+const PATH: Law = Law {
+    stage: "lambda's path",
+    seconds: |points, coils| 7e-10 * points * coils.powi(2) + 2e-8 * coils.powi(3),
+    reduce: FEWER,
+};
+/// `--law "worst-point, 25 overlapping coils:points" --law worst-point:coils`.
+const WORST_POINT: Law = Law {
+    stage: "the worst point's force constants",
+    seconds: |points, coils| 8e-8 * points * coils + 4e-8 * coils.powi(3),
+    reduce: FEWER,
+};
+/// Of the force of a coil at a point through coupled steel, s.
+pub const STEEL_POINT_COIL_S: f64 = 1.5e-6;
+
+impl Law {
+    fn cost(&self, points: f64, coils: f64) -> Cost {
+        Cost {
+            what: format!("{} of {coils} coils at {points} points", self.stage),
+            bytes: 0.0,
+            cpu_seconds: (self.seconds)(points, coils),
+            reduce: self.reduce,
+            misses: None,
+        }
+    }
+}
 
 /// Memory and time of a part of a job.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +148,40 @@ pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
     }
 }
 
+/// The time that forces and force constants of `design` at the points of `shape` take.
+#[must_use]
+pub fn of_force_constants(
+    design: &Design,
+    shape: &ShapeDocument,
+    tolerance: Option<f64>,
+) -> Vec<Cost> {
+    let points = product(&[shape.grid.x.samples(), shape.grid.y.samples()]);
+    let positions_m = &design.array.positions_m;
+    let forces = if coupled(design) || design.has_iron() {
+        FORCES_OF_STEEL
+    } else if is_wide(design, tolerance) {
+        FORCES_FROM_FAR
+    } else {
+        FORCES
+    };
+    [forces, PATH, WORST_POINT]
+        .map(|law| law.cost(points, positions_m.len() as f64))
+        .into()
+}
+
+/// Whether the coils of `design` are so far from each other's points that forces are computed the sure way.
+fn is_wide(design: &Design, tolerance: Option<f64>) -> bool {
+    let Ok(scene) = Scene::with_tolerance(design, tolerance) else {
+        return false;
+    };
+    let [x_m, y_m] = [0, 1].map(|axis| {
+        let along = design.array.positions_m.iter().map(|place| place[axis]);
+        along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+    });
+    let tolerance = scene.tolerances.forces;
+    !scene.winding.is_quick_at(x_m.hypot(y_m), tolerance)
+}
+
 /// The field of every coil of `design` at `points` points, `components` numbers each.
 #[must_use]
 pub fn of_probe(design: &Design, points: usize, components: usize) -> Cost {
@@ -157,4 +246,44 @@ pub fn of_pull(design: &Design, tolerance: f64) -> Option<Cost> {
 
 fn product(factors: &[usize]) -> f64 {
     factors.iter().map(|f| *f as f64).product()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest size of a row of the scaling that is recorded, and its seconds.
+    fn largest(stage: &str, axis: &str) -> (f64, f64) {
+        let text = include_str!("../../results/bench/scaling/scaling.csv");
+        let mut rows = csv::Reader::from_reader(text.as_bytes());
+        let rows = rows.records().map(Result::unwrap);
+        let of = rows.filter(|row| &row[0] == stage && &row[1] == axis);
+        of.map(|row| (row[2].parse().unwrap(), row[4].parse().unwrap()))
+            .max_by(|a: &(f64, f64), b| a.0.total_cmp(&b.0))
+            .unwrap()
+    }
+
+    #[test]
+    fn laws_are_those_of_the_recorded_measurements() {
+        const POINTS: f64 = 3721.0;
+        for (law, stage, coils) in [
+            (FORCES, "forces", 9.0),
+            (FORCES_OF_STEEL, "forces, coupled", 9.0),
+            (PATH, "lambda-path", 9.0),
+            (WORST_POINT, "worst-point, 25 overlapping coils", 25.0),
+        ] {
+            let (points, seconds) = largest(stage, "points");
+            let share = (law.seconds)(points, coils) / seconds;
+            assert!((0.33..3.0).contains(&share), "{stage}: {share}");
+        }
+        for (law, stage) in [
+            (FORCES_FROM_FAR, "forces"),
+            (PATH, "lambda-path"),
+            (WORST_POINT, "worst-point"),
+        ] {
+            let (coils, seconds) = largest(stage, "coils");
+            let share = (law.seconds)(POINTS, coils) / seconds;
+            assert!((0.33..3.0).contains(&share), "{stage}: {share}");
+        }
+    }
 }

@@ -12,6 +12,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::height::Grid;
 use fluxform_base::progress::{Interrupted, Progress};
@@ -45,7 +46,7 @@ pub type HeightAt<'a> = &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync);
 
 /// Cells of a grid whose corners describe the surface badly, sampled on finer places; columns of equal
 /// length.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FineCells {
     /// Whether each cell, x fastest, is left to its corners; empty where all are.
     pub smooth: Vec<bool>,

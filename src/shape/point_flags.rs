@@ -1,5 +1,7 @@
 //! Flags of a point: on a wall, a rim, a crease, under or over other sheets.
 
+use serde::{Deserialize, Serialize};
+
 use crate::file_mesh::Triangle;
 use crate::height::{Sample, sample_of};
 use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, may_touch, upward_normal};
@@ -13,7 +15,7 @@ const SAME_ANGLE: f64 = 1e-9;
 const SAME_HEIGHT: f64 = 1e-9;
 
 /// Flags of a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Marks {
     /// A vertical wall passes through it; the height is the wall's top.
     pub wall: bool,

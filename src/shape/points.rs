@@ -1,6 +1,7 @@
 //! From a shape document to its constraint points (eq. 6): (x_j, y_j, h_j), x fastest, then y.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::certificate::{Certificate, Certify, by_cell, certify};
 use crate::deviation::CERTIFY_SECONDS;
@@ -145,6 +146,39 @@ pub struct Discretized {
     pub warnings: Vec<String>,
 }
 
+impl Discretized {
+    /// What another run on the same points and surface need not compute.
+    #[must_use]
+    pub fn known(&self) -> Known {
+        let points = &self.points;
+        Known {
+            certificate: self.certificate.clone(),
+            marked: (!points.area_m2.is_empty()).then(|| Marked {
+                marks: points.marks.clone(),
+                area_m2: points.area_m2.clone(),
+                fine: points.fine.clone(),
+            }),
+        }
+    }
+}
+
+/// What is dear to compute of points and their surface, as far as it was computed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// As [`Discretized::certificate`].
+    pub certificate: Option<Certificate>,
+    /// Flags and areas.
+    pub marked: Option<Marked>,
+}
+
+/// Flags and areas of all points, as [`ConstraintPoints`] has them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Marked {
+    marks: Vec<Marks>,
+    area_m2: Vec<f64>,
+    fine: FineCells,
+}
+
 /// Options of discretising.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -154,8 +188,8 @@ pub struct Settings {
     pub certify: Certify,
     /// Time that it may take, s of one core about; counted, so that every machine stops at the same place.
     pub certify_seconds: u64,
-    /// Result of an earlier comparison of these points with this surface; it is not repeated.
-    pub known: Option<Certificate>,
+    /// Results of an earlier run for these points and this surface; they are not computed again.
+    pub known: Known,
     /// Whether walls, rims, creases, overhangs and the points' areas are looked for.
     pub marks: bool,
     /// Whether the vertical difference is reported for every cell.
@@ -168,7 +202,7 @@ impl Default for Settings {
             holes: Holes::default(),
             certify: Certify::default(),
             certify_seconds: CERTIFY_SECONDS,
-            known: None,
+            known: Known::default(),
             marks: false,
             cells: false,
         }
@@ -263,7 +297,11 @@ pub fn discretize_surface(
     let rounding_m = surface.coordinate_rounding_m();
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
-    if settings.marks {
+    if let (true, Some(known)) = (settings.marks, &settings.known.marked) {
+        points.marks.clone_from(&known.marks);
+        points.area_m2.clone_from(&known.area_m2);
+        points.fine = known.fine.clone();
+    } else if settings.marks {
         let probe = Probe::new(surface, &points.grid);
         mark(&mut points, &probe, &found, progress)?;
         (points.area_m2, points.fine) = point_areas_m2(&points, &probe, progress)?;
@@ -287,7 +325,7 @@ pub fn discretize_surface(
              between them is not computed"
         ));
     }
-    let certificate = match &settings.known {
+    let certificate = match &settings.known.certificate {
         Some(known) if how != Certify::No => Some(known.clone()),
         _ => certify(surface, &grid, &samples, how, seconds, progress)?,
     };

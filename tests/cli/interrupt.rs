@@ -310,6 +310,28 @@ fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
 }
 
 #[test]
+fn a_command_of_minutes_says_so_before_it_begins() {
+    let place = Place::new();
+    let wide = "name = \"wide\"\nprimitive = \"flat\"\nside_mm = 700.0\nheight_mm = 50.0\n[points]\n\
+                x_mm = [-350.0, 350.0, 601]\ny_mm = [-350.0, 350.0, 601]\n";
+    place.write("wide.toml", wide);
+    place.write("air.toml", &array(15, "", 100.0));
+    let child = place
+        .command(&["lambda", "air.toml", "wide.toml", "--threads", "1"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    sleep(Duration::from_millis(1500));
+    terminate(&child);
+    let (code, said) = wait(child);
+    assert_eq!(code, Some(130), "{said}");
+    let announced =
+        "this will take about 4 min, most of it the forces of 225 coils at 361201 points";
+    assert!(said.contains(announced), "{said}");
+}
+
+#[test]
 fn a_signal_ends_what_reads_a_bundle() {
     let place = Place::new();
     let made = [

@@ -16,6 +16,7 @@ use fluxform_shape::holes::{Holes, fill, holes};
 use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::point_flags::Marks;
+use fluxform_shape::points::Known;
 use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::scattered::Probe;
 use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
@@ -214,19 +215,20 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
     text += "endsolid ring\n";
     std::fs::write(&path, text).unwrap();
     let document = file(&path, 0.001, Placement::default(), seed_grid());
-    let run = |holes| {
+    let run = |holes, known| {
         let settings = Settings {
             holes,
             certify: Certify::Vertical,
             marks: true,
             cells: false,
-            known: None,
+            known,
             ..Settings::default()
         };
         discretize_with(&document, &settings, &Silent)
     };
-    let skipped = run(Holes::Skip).unwrap();
-    let filled = run(Holes::Fill).unwrap();
+    let skipped = run(Holes::Skip, Known::default()).unwrap();
+    let filled = run(Holes::Fill, Known::default()).unwrap();
+    assert_eq!(run(Holes::Skip, skipped.known()).unwrap(), skipped);
     let count = skipped.points.holes;
     assert!(count > 90 && filled.points.holes == count, "{count}");
     assert_eq!(filled.points.len(), skipped.points.len() + count);
@@ -242,7 +244,7 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
             .all(|h| (h - 0.03).abs() < 1e-12)
     );
     assert!(skipped.warnings.iter().any(|w| w.contains("silhouette")));
-    let refused = run(Holes::Error).unwrap_err().to_string();
+    let refused = run(Holes::Error, Known::default()).unwrap_err().to_string();
     assert!(refused.contains("--holes"), "{refused}");
 }
 

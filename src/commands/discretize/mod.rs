@@ -29,6 +29,7 @@ use crate::shape::document::{GridRequest, ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
+use crate::shape::points::Known;
 use crate::shape::surface::{ByteObserver, LARGEST_FILE, read_file};
 use crate::shape::{
     ConstraintPoints, Discretized, Settings, ShapeError, Surface, discretize_surface,
@@ -396,8 +397,8 @@ impl OpenedSurface {
         &self.inputs
     }
 
-    /// As [`Self::discretize`], flagged by `marks`, with the certificate that an earlier run cached for these points and
-    /// this surface as `what`.
+    /// As [`Self::discretize`], flagged by `marks`, with what an earlier run cached for these points and this surface
+    /// as `what`.
     ///
     /// # Errors
     /// As [`run_with`].
@@ -407,16 +408,18 @@ impl OpenedSurface {
         field: ShapeField,
         progress: &dyn Progress,
     ) -> Result<PointsReport, RunError> {
-        let cached = field.certificate(what, document, &self.inputs);
-        let known = cached.known();
-        let new = known.is_none();
+        let cached = field.points(what, document, &self.inputs);
+        let known: Option<Known> = cached.known();
+        let complete = known
+            .as_ref()
+            .is_some_and(|known| known.certificate.is_some() && (known.marked.is_some() || !marks));
         let options = PointsOptions {
             marks,
             ..PointsOptions::default()
         };
         let report = self.discretize(document, &options, known, progress)?;
-        if let (true, Some(certificate)) = (new, &report.discretized.certificate) {
-            cached.keep(certificate);
+        if !complete {
+            cached.keep(&report.discretized.known());
         }
         Ok(report)
     }
@@ -468,7 +471,7 @@ impl OpenedSurface {
         &self,
         document: &ShapeDocument,
         options: &PointsOptions,
-        known: Option<Certificate>,
+        known: Option<Known>,
         progress: &dyn Progress,
     ) -> Result<PointsReport, RunError> {
         let asked = (
@@ -477,7 +480,8 @@ impl OpenedSurface {
             options.certify,
             options.certify_seconds,
         );
-        let known = known.or_else(|| self.certified_before(&asked));
+        let mut known = known.unwrap_or_default();
+        known.certificate = known.certificate.or_else(|| self.certified_before(&asked));
         let settings = Settings {
             holes: options.holes,
             certify: options.certify,

@@ -99,7 +99,7 @@ const fn spec(
 }
 
 /// Every law.
-pub const LAWS: [Spec; 21] = [
+pub const LAWS: [Spec; 22] = [
     spec(
         "map-table",
         "coils",
@@ -135,6 +135,7 @@ pub const LAWS: [Spec; 21] = [
         &[31, 61, 121, 241, 481],
         force_points,
     ),
+    spec("forces", "coils", COILS, &[3, 6, 10, 15], force_coils),
     spec(
         "forces, coupled",
         "points",
@@ -304,6 +305,12 @@ fn force_points(samples: usize, effort: &Effort) -> Sized {
     let points = places(samples);
     let work = || scene.forces_n_per_a(&solved, &points, &Silent);
     Ok((points.len() as f64, measure(effort, work)?.1))
+}
+
+/// At points over the whole array, far from most coils.
+fn force_coils(side: usize, effort: &Effort) -> Sized {
+    let work = || forces_over_all(&SEED_AIR, side, SAMPLES, dome_m);
+    Ok(((side * side) as f64, measure(effort, work)?.1))
 }
 
 fn coupled_points(samples: usize, effort: &Effort) -> Sized {

@@ -342,7 +342,7 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
     let each = seconds
         + physics.count(Level::Search) as f64
             * design.array.positions_m.len() as f64
-            * POINT_COIL_S;
+            * crate::scene::cost::STEEL_POINT_COIL_S;
     let evaluations = request.settings.evaluations;
     format!(
         "computes {evaluations} arrays at most and {MORE_EVALUATIONS} about the best, about {:.0} CPU s; Ctrl-C gives \
@@ -350,9 +350,6 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
         (each * (evaluations + MORE_EVALUATIONS) as f64).ceil()
     )
 }
-
-/// CPU time of a coil's force at a point through coupled steel, s.
-const POINT_COIL_S: f64 = 2e-6;
 
 /// Writes a text where that was requested; returns where the summary goes.
 fn written_to(
