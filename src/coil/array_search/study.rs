@@ -140,15 +140,7 @@ pub const TRADED: [(&str, LimitName); 3] = [
 /// A quantity of a design.
 fn traded(problem: &ArrayProblem, x: &[f64], physical: &Physical, name: LimitName) -> Option<f64> {
     let design = problem.space.design(x);
-    let (circuit, mass_kg) = ArrayProblem::coil(&design, physical.inductance_h)?;
-    (name.limit().value)(&crate::limits::Evaluated {
-        design: &design,
-        circuit: &circuit,
-        power_w: 0.0,
-        mass_kg,
-        core_field_t: None,
-        array_inductance_h: Some(physical.array_inductance_h),
-    })
+    ArrayProblem::evaluated(&design, Some(physical), name.limit().value)?
 }
 
 /// A view of a result that was found.

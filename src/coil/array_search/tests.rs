@@ -35,6 +35,7 @@ impl Physics for OnAxis {
             merits: vec![field.dbz_dz.abs() / height_m],
             inductance_h,
             array_inductance_h: inductance_h,
+            used: Default::default(),
             core_field_t: None,
         }))
     }

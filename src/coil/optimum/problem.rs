@@ -308,8 +308,11 @@ impl<'a> Problem<'a> {
                 // Never among the bounds: one coil does not decide them.
                 LimitName::Footprint
                 | LimitName::ArrayPower
+                | LimitName::StaticPower
+                | LimitName::FeedbackPower
                 | LimitName::ArrayMass
-                | LimitName::ArraySettling => along(f64::NAN, [0.0; 3]),
+                | LimitName::ArraySettling
+                | LimitName::ArrayCost => along(f64::NAN, [0.0; 3]),
             })
             .collect();
         Some(Rated {
