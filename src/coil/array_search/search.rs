@@ -121,6 +121,16 @@ impl SearchedChoice {
     }
 }
 
+/// A choice that was searched to its end beside the best one.
+pub struct Finished<'a> {
+    /// Its problem.
+    pub problem: &'a ArrayProblem<'a>,
+    /// The search over it.
+    pub search: Search<'a>,
+    /// Its best design.
+    pub best: Candidate,
+}
+
 /// The result of a search.
 pub struct Found<'a> {
     /// The problem of the best choice.
@@ -133,6 +143,8 @@ pub struct Found<'a> {
     pub evaluations: usize,
     /// Every choice that was searched.
     pub choices: Vec<SearchedChoice>,
+    /// The best choices of other numbers of coils, where these were searched to their end.
+    pub others: Vec<Finished<'a>>,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -274,31 +286,37 @@ fn short(value: f64) -> String {
         .map_or(rounded, |value| value.to_string())
 }
 
-/// Searches the best choice of every number of coils but the first choice's to its end; how many arrays that took,
-/// and whether it was interrupted.
+/// Searches the best choice of every number of coils but the first choice's to its end: which these are, each with
+/// its best design, how many arrays that took, and whether it was interrupted.
 fn finish_counts(
     problems: &[ArrayProblem<'_>],
     design: &Design,
     settings: Settings,
     first: usize,
     left_out: &mut [(usize, Search<'_>)],
-) -> (usize, bool) {
+) -> (Vec<(usize, Candidate)>, usize, bool) {
     let coils = |index: usize| problems[index].space.coils();
     let (mut done, mut evaluations) = (vec![coils(first)], 0);
+    let mut finished = Vec::new();
     for (other, search) in left_out.iter_mut().rev() {
         if done.contains(&coils(*other)) {
             continue;
         }
         done.push(coils(*other));
+        let problem = &problems[*other];
         let before = search.samples().len();
         search.allow(settings.evaluations);
-        let stopped = is_stopped(|| search.run(&[problems[*other].space.given(design)]));
+        let ended = interruptible(|| {
+            search.run(&[problem.space.given(design)])?;
+            accept(problem, search)
+        });
         evaluations += search.samples().len() - before;
-        if stopped {
-            return (evaluations, true);
+        match ended.and_then(|ended| ended) {
+            Ok(best) => finished.extend(best.map(|best| (*other, best))),
+            Err(Interrupted) => return (finished, evaluations, true),
         }
     }
-    (evaluations, false)
+    (finished, evaluations, false)
 }
 
 /// Searches every problem and computes the best design to full accuracy.
@@ -354,8 +372,11 @@ pub fn run<'a>(
     };
     interrupted |= accepted.is_err();
     evaluations += search.samples().len() - before;
+    let mut finished = Vec::new();
     if request.every_count && !interrupted {
-        let (more, stopped) = finish_counts(problems, design, settings, index, &mut left_out);
+        let (others, more, stopped) =
+            finish_counts(problems, design, settings, index, &mut left_out);
+        finished = others;
         evaluations += more;
         interrupted = stopped;
     }
@@ -376,12 +397,22 @@ pub fn run<'a>(
             .collect();
         (best, choices)
     });
+    let others = left_out.into_iter().filter_map(|(index, search)| {
+        let at = finished.iter().position(|(other, _)| *other == index)?;
+        Some(Finished {
+            problem: &problems[index],
+            search,
+            best: finished.swap_remove(at).1,
+        })
+    });
+    let others = others.collect();
     Ok(best.map(|best| Found {
         problem,
         search,
         best,
         evaluations,
         choices,
+        others,
         interrupted,
     }))
 }

@@ -53,8 +53,8 @@ pub struct ArrayFlags {
     /// Most arrays that the search computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
     pub evaluations: usize,
-    /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); the best of every
-    /// number of coils is then searched to its end
+    /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); every number of coils is
+    /// then searched to its end, and for each of these costs
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
     /// Draw them here, with what limits are worth (SVG, PNG or PDF); of one coil the force around it
