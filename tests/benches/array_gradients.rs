@@ -17,7 +17,7 @@ use std::error::Error;
 use std::path::Path;
 
 use cpu_time::ProcessTime;
-use fluxform::coil::array_search::problem::{ArrayProblem, Level, Objective, Physics, Room};
+use fluxform::coil::array_search::problem::{ArrayProblem, Level, Objective, Room};
 use fluxform::coil::array_search::search::{Request, problems};
 use fluxform::commands::optimize::array::physics::{Aim, ArrayPhysics};
 use fluxform::design::{Design, Need};
@@ -35,10 +35,10 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 const SHAPES: [&str; 2] = ["shapes/flat.toml", "shapes/half_sphere.toml"];
 /// Arrays that either search may compute.
-const ARRAYS: usize = 100;
+const ARRAYS: usize = 160;
 const SEEDS: u64 = 5;
 /// Gains whose first arrays are compared.
-const GAINS: [f64; 3] = [0.97, 1.0, 1.02];
+const GAINS: [f64; 4] = [0.9, 0.95, 0.97, 1.0];
 /// Distance of the neighbours that stand for a gradient, as a share of the ranges.
 const NEIGHBOUR: f64 = 1e-2;
 /// Width of the prototype's trust region: first, last, and its factors.
@@ -57,7 +57,7 @@ fn at_pitch(design: &Design, pitch_m: f64) -> Design {
 
 /// lambda_jnd along the pitch: its derivative from the forces' against differences of it.
 fn taylor(design: &Design, physics: &ArrayPhysics<'_>) -> Result<(), Failure> {
-    let tolerance = Some(1e-6);
+    let tolerance = Some(1e-5);
     let positions_m = physics.positions_m(0.0, Level::Search);
     let height_m: Vec<f64> = positions_m.iter().map(|p| p[2]).collect();
     let lowest_m = height_m.iter().copied().fold(f64::INFINITY, f64::min);
@@ -139,7 +139,7 @@ fn neighbours(variables: &[Variable], x: &[f64]) -> Vec<Vec<f64>> {
         } else {
             -1.0
         };
-        let moved = match variable.values {
+        let moved = match &variable.values {
             Values::Continuous => at + inwards * NEIGHBOUR * (variable.high - variable.low),
             Values::Whole => at + inwards,
             Values::Listed(list) => {

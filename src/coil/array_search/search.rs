@@ -145,6 +145,8 @@ pub struct Found<'a> {
     pub choices: Vec<SearchedChoice>,
     /// The best choices of other numbers of coils, where these were searched to their end.
     pub others: Vec<Finished<'a>>,
+    /// Whether every number of coils was to be searched to its end.
+    pub every_count: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -413,6 +415,7 @@ pub fn run<'a>(
         evaluations,
         choices,
         others,
+        every_count: request.every_count,
         interrupted,
     }))
 }

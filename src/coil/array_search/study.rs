@@ -124,18 +124,42 @@ const FLATTEST: f64 = 0.02;
 const ACTIVE: f64 = 1e-4;
 /// Parts of the best design's mass, heat and time for which the best is computed, from the nearest on.
 const PARTS: [&[f64]; 2] = [&[0.92, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25], &[1.15, 1.4]];
-/// Descents for each at most, every one on a surrogate that knows where the one before ended; so many in turn that gain
-/// less than this are the last.
-const DESCENTS: usize = 8;
+/// Descents in turn that gain less than this are the last.
 const PATIENCE: usize = 2;
 const NO_BETTER: f64 = 1e-3;
-/// Starts of each beside the end of the one before, and the share of a range by which they lie apart.
-const OTHER_STARTS: usize = 6;
+/// Share of a range by which the starts of a descent lie apart.
 const APART: f64 = 0.2;
 /// Steps to which neighbours' lengths are rounded, mm.
 const STEPS_MM: [f64; 2] = [0.5, 1.0];
-/// Evaluations that the study may add.
-pub const MORE_EVALUATIONS: usize = 120;
+/// How much work the trade-offs are worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Evaluations that the study may add to a search.
+    pub evaluations: usize,
+    /// Descents for each value at most, every one on a surrogate that knows where the one before ended.
+    descents: usize,
+    /// Starts of each beside the end of the one before.
+    other_starts: usize,
+}
+
+impl Effort {
+    /// More where the trade-offs are requested, of every number of coils.
+    #[must_use]
+    pub const fn of(every_count: bool) -> Self {
+        match every_count {
+            true => Self {
+                evaluations: 120,
+                descents: 8,
+                other_starts: 6,
+            },
+            false => Self {
+                evaluations: 80,
+                descents: 2,
+                other_starts: 0,
+            },
+        }
+    }
+}
 
 /// The quantities that are traded for the objective, by key.
 pub const TRADED: [(&str, LimitName); 3] = [
@@ -156,6 +180,7 @@ struct View<'s, 'a> {
     search: &'s mut Search<'a>,
     best: Candidate,
     surrogate: Surrogate,
+    effort: Effort,
 }
 
 /// The surroundings of `found`, compared with `design`.
@@ -164,10 +189,11 @@ struct View<'s, 'a> {
 /// Interruption.
 pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
     let (search, best) = (&mut found.search, found.best.clone());
+    let effort = Effort::of(found.every_count);
     let before = search.samples().len();
     // The same for every number of coils, so that at each the best of all is known.
     let here = TRADED.map(|(_, name)| traded(found.problem, &best.x, &best.physical, name));
-    let Some(mut view) = View::new(found.problem, search, best) else {
+    let Some(mut view) = View::new(found.problem, search, best, effort) else {
         return Ok(Study::default());
     };
     let limits = view.limits();
@@ -178,7 +204,9 @@ pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupte
     found.evaluations += found.search.samples().len() - before;
     for other in &mut found.others {
         let before = other.search.samples().len();
-        if let Some(mut view) = View::new(other.problem, &mut other.search, other.best.clone()) {
+        if let Some(mut view) =
+            View::new(other.problem, &mut other.search, other.best.clone(), effort)
+        {
             view.trade(&here)?;
             designs.extend(view.designs());
         }
@@ -212,13 +240,15 @@ impl<'s, 'a> View<'s, 'a> {
         problem: &'a ArrayProblem<'a>,
         search: &'s mut Search<'a>,
         best: Candidate,
+        effort: Effort,
     ) -> Option<Self> {
-        search.allow(search.samples().len() + MORE_EVALUATIONS);
+        search.allow(search.samples().len() + effort.evaluations);
         Some(Self {
             problem,
             surrogate: search.surrogate()?,
             search,
             best,
+            effort,
         })
     }
 
@@ -401,7 +431,7 @@ impl<'s, 'a> View<'s, 'a> {
         let (_, name) = TRADED[cost];
         let mut best: Option<(f64, Vec<f64>)> = None;
         let mut no_better = 0;
-        for _ in 0..DESCENTS {
+        for _ in 0..self.effort.descents {
             let x = best.as_ref().map_or(&from, |(_, x)| x);
             let next = self.best_below(x, name, most).filter(|next| next != x);
             let Some(next) = next else { break };
@@ -475,7 +505,7 @@ impl<'s, 'a> View<'s, 'a> {
                 let other = search.units(other);
                 u.iter().zip(&other).any(|(a, b)| (a - b).abs() > APART)
             };
-            if starts.len() <= OTHER_STARTS && starts.iter().all(apart) {
+            if starts.len() <= self.effort.other_starts && starts.iter().all(apart) {
                 starts.push(x.clone());
             }
         }

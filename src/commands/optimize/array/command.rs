@@ -15,7 +15,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::problem::Level;
-use crate::coil::array_search::study::MORE_EVALUATIONS;
+use crate::coil::array_search::study::Effort;
 use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
 use crate::design::template::Template;
@@ -344,10 +344,11 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
             * design.array.positions_m.len() as f64
             * POINT_COIL_S;
     let evaluations = request.settings.evaluations;
+    let more = Effort::of(request.every_count).evaluations;
     format!(
-        "computes {evaluations} arrays at most and {MORE_EVALUATIONS} about the best, about {:.0} CPU s; Ctrl-C gives \
+        "computes {evaluations} arrays at most and {more} about the best, about {:.0} CPU s; Ctrl-C gives \
          the best so far",
-        (each * (evaluations + MORE_EVALUATIONS) as f64).ceil()
+        (each * (evaluations + more) as f64).ceil()
     )
 }
 
