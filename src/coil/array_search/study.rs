@@ -140,6 +140,8 @@ pub struct Effort {
     descents: usize,
     /// Starts of each beside the end of the one before.
     other_starts: usize,
+    /// Ways along [`PARTS`]; a second one knows what the first has computed.
+    ways: usize,
 }
 
 impl Effort {
@@ -148,14 +150,16 @@ impl Effort {
     pub const fn of(every_count: bool) -> Self {
         match every_count {
             true => Self {
-                evaluations: 120,
+                evaluations: 200,
                 descents: 8,
                 other_starts: 6,
+                ways: 4,
             },
             false => Self {
                 evaluations: 80,
                 descents: 2,
                 other_starts: 0,
+                ways: 2,
             },
         }
     }
@@ -410,7 +414,7 @@ impl<'s, 'a> View<'s, 'a> {
     fn trade(&mut self, here: &[Option<f64>; 3]) -> Result<(), Interrupted> {
         for (cost, here) in here.iter().enumerate() {
             let Some(here) = here else { continue };
-            for parts in PARTS {
+            for parts in [PARTS; 2].into_iter().flatten().take(self.effort.ways) {
                 let mut x = self.best.x.clone();
                 for part in parts {
                     x = self.trade_below(x, cost, part * here)?;
