@@ -321,29 +321,21 @@ fn finish_counts(
     (finished, evaluations, false)
 }
 
-/// Searches every problem and computes the best design to full accuracy.
-///
-/// # Errors
-/// Interruption before anything is known.
-pub fn run<'a>(
+/// Searches all that are `going` with ever more evaluations until one is left; those left out, the worst first, the
+/// evaluations, and whether it was interrupted.
+fn halved<'a>(
     problems: &'a [ArrayProblem<'a>],
     design: &Design,
-    request: &Request,
-) -> Result<Option<Found<'a>>, Interrupted> {
-    let settings = request.settings;
-    let mut going: Vec<(usize, Search<'a>)> = problems
-        .iter()
-        .enumerate()
-        .map(|(index, problem)| (index, Search::new(problem, settings)))
-        .collect();
+    settings: Settings,
+    going: &mut Vec<(usize, Search<'a>)>,
+) -> (Vec<(usize, Search<'a>)>, usize, bool) {
     let mut evaluations = 0;
-    // The worst first.
     let mut left_out: Vec<(usize, Search<'a>)> = Vec::new();
     let mut interrupted = false;
     // The better half goes on with twice as many evaluations each.
     while going.len() > 1 && !interrupted {
         let each = (settings.evaluations / (2 * going.len())).max(LEAST_EVALUATIONS);
-        for (index, search) in &mut going {
+        for (index, search) in going.iter_mut() {
             let before = search.samples().len();
             search.allow(before + each);
             interrupted = is_stopped(|| search.run(&[problems[*index].space.given(design)]));
@@ -361,6 +353,26 @@ pub fn run<'a>(
         let worse = going.split_off(going.len().div_ceil(2));
         left_out.extend(worse.into_iter().rev());
     }
+    (left_out, evaluations, interrupted)
+}
+
+/// Searches every problem and computes the best design to full accuracy.
+///
+/// # Errors
+/// Interruption before anything is known.
+pub fn run<'a>(
+    problems: &'a [ArrayProblem<'a>],
+    design: &Design,
+    request: &Request,
+) -> Result<Option<Found<'a>>, Interrupted> {
+    let settings = request.settings;
+    let mut going: Vec<(usize, Search<'a>)> = problems
+        .iter()
+        .enumerate()
+        .map(|(index, problem)| (index, Search::new(problem, settings)))
+        .collect();
+    let (mut left_out, mut evaluations, mut interrupted) =
+        halved(problems, design, settings, &mut going);
     let Some((index, mut search)) = going.into_iter().next() else {
         return Ok(None);
     };
