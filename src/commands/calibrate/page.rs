@@ -67,7 +67,7 @@ fn limit_checks(
         mass_kg: circuit.wire_mass_kg + steel_kg,
         core_field_t: peak_t,
         array_inductance_h: Some(array_inductance_h),
-        used: used(scene, &content.lambda),
+        used: used(scene, content.lambda),
     });
     let limited = scene.design.limits.core_field_max_t.is_some() && scene.core.is_some();
     let of_steel =

@@ -413,25 +413,29 @@ impl<'a> ArrayPhysics<'a> {
 /// A shape's points, for the upward force or for the force vector.
 struct Rendering<'a> {
     problem: ForceProblem<'a>,
-    /// Of the force vector: forces along x and y, N/A, and the requested directions.
-    sides: Option<([Vec<f64>; 2], Vec<[f64; 3]>)>,
+    /// Forces along x and y, N/A; `None` of the upward force.
+    sides_n_per_a: Option<[Vec<f64>; 2]>,
+    /// The requested directions; empty of the upward force.
+    direction: Vec<[f64; 3]>,
 }
 
 impl<'a> Rendering<'a> {
     fn new(problem: ForceProblem<'a>, vectors: Option<&[[f64; 3]]>, points: &ForcePoints) -> Self {
-        let sides = vectors.map(|vectors| {
-            let sides = [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect());
-            (sides, points.directions(RequestedForce::default()))
-        });
-        Self { problem, sides }
+        let directions = |_| points.directions(RequestedForce::default());
+        Self {
+            problem,
+            sides_n_per_a: vectors
+                .map(|vectors| [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect())),
+            direction: vectors.map(directions).unwrap_or_default(),
+        }
     }
 
     fn vector(&self) -> Option<VectorProblem<'_>> {
-        let ([x, y], direction) = self.sides.as_ref()?;
+        let [x, y] = self.sides_n_per_a.as_ref()?;
         Some(VectorProblem {
             upward: self.problem,
             sides_n_per_a: [x, y],
-            direction,
+            direction: &self.direction,
         })
     }
 }
