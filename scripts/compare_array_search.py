@@ -229,14 +229,15 @@ def main():
     parser.add_argument("--evaluations", type=int, default=100, help="arrays that each may compute")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--only", nargs="+", choices=[OURS, *PEERS], default=[OURS, *PEERS], help="these rows")
     parser.add_argument("--short", action="store_true", help="two seeds, 40 arrays")
     options = parser.parse_args()
     if options.short:
         options.seeds, options.evaluations = 2, 40
     os.environ["RAYON_NUM_THREADS"] = "1"
     options.program = str(Path(options.program).resolve())
-    jobs = [(name, seed, options) for name in [OURS, *PEERS] for seed in range(1, options.seeds + 1)]
-    traces, times = {name: [] for name in [OURS, *PEERS]}, {name: [] for name in [OURS, *PEERS]}
+    jobs = [(name, seed, options) for name in options.only for seed in range(1, options.seeds + 1)]
+    traces, times = {name: [] for name in options.only}, {name: [] for name in options.only}
     with multiprocessing.Pool(options.processes) as pool:
         for name, trace, seconds in pool.imap(one, jobs):
             traces[name].append(trace + [trace[-1]] * (options.evaluations - len(trace)))
@@ -247,9 +248,11 @@ def main():
     for name, all_traces in traces.items():
         cells = [quartiles([trace[k - 1] for trace in all_traces]) for k in counts]
         print(f"| {name} | " + " | ".join(cells) + f" | {statistics.median(times[name]):.0f} |")
+    if OURS not in options.only:
+        return
     medians = numpy.median(numpy.array(traces[OURS]), axis=0)
     print(f"\n| peer | where its median ends, {OURS} is after |\n|---|---|")
-    for name in PEERS:
+    for name in [name for name in PEERS if name in options.only]:
         end = statistics.median(trace[-1] for trace in traces[name])
         there = [k + 1 for k, value in enumerate(medians) if value >= end]
         fewer = f"{there[0]} arrays, {options.evaluations / there[0]:.1f} times fewer" if there else "not there"

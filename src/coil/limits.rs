@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::circuit::{Circuit, turns_that_fit};
 use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
@@ -39,10 +39,16 @@ pub enum LimitName {
     Footprint,
     /// Heat of all coils at their largest currents, W.
     ArrayPower,
+    /// Heat of all coils at the static currents of the shape that takes most, W.
+    StaticPower,
+    /// Mean heat of all coils with position feedback over the shape that takes most, W.
+    FeedbackPower,
     /// Mass of all coils, cores and the plate, kg.
     ArrayMass,
     /// Five time constants of the slowest pattern of currents in the array, s.
     ArraySettling,
+    /// Cost of all coils, cores and the plate.
+    ArrayCost,
     /// Turns over turns that fit; always holds.
     WindingFill,
     /// The supply's voltage, V, where the driver's current is the rated one.
@@ -101,6 +107,8 @@ pub struct Limit {
     pub ends_growth: bool,
     /// Whether it is one of the whole array, not of a coil.
     pub of_array: bool,
+    /// Whether its value follows from shapes, not from a design alone.
+    pub of_shapes: bool,
     /// The limit that a design sets, SI.
     pub of: fn(&Limits) -> Option<f64>,
     /// Its value in an evaluated coil, SI.
@@ -122,6 +130,17 @@ pub struct Evaluated<'a> {
     pub core_field_t: Option<f64>,
     /// Inductance of the slowest pattern of currents in the array, H, where that is known.
     pub array_inductance_h: Option<f64>,
+    /// What the shapes take, where they are known.
+    pub used: UsedPower,
+}
+
+/// Heat of all coils by the use of the array, W: of the shape that takes most, at its force constant.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct UsedPower {
+    /// With static currents; `None` where they are not known.
+    pub static_w: Option<f64>,
+    /// The mean with position feedback, by currents of least power; `None` where they are not known.
+    pub feedback_w: Option<f64>,
 }
 
 impl Evaluated<'_> {
@@ -147,6 +166,16 @@ impl Evaluated<'_> {
         let plate_m3 = plate_m3.map_or(0.0, Plate::volume_m3);
         self.mass_kg * self.design.array.positions_m.len() as f64
             + plate_m3 * STEEL_DENSITY_KG_PER_M3
+    }
+
+    /// Cost of all coils, cores and the plate.
+    fn array_cost(&self) -> f64 {
+        let prices = &self.design.prices;
+        let coils = self.design.array.positions_m.len() as f64;
+        let wire_kg = coils * self.circuit.wire_mass_kg;
+        coils * prices.per_coil
+            + wire_kg * prices.wire_per_kg
+            + (self.array_mass_kg() - wire_kg) * prices.steel_per_kg
     }
 
     /// Larger side of the rectangle that holds all coils and the plate, m.
@@ -212,8 +241,24 @@ const SIZE: Limit = Limit {
     direction: Direction::AtMost,
     ends_growth: false,
     of_array: false,
+    of_shapes: false,
     of: |limits| limits.outer_diameter_max_m,
     value: |at| Some(at.coil()?.outer_diameter_m),
+};
+
+/// The heat of all coils, and what its other rows have.
+const HEAT_OF_ALL: Limit = Limit {
+    name: LimitName::ArrayPower,
+    key: "array_power_w",
+    design_key: "limits.array_power_max_w",
+    label: "heat of all coils",
+    unit: "W",
+    written: ("W", 1.0),
+    step: ("W", 1.0),
+    of_array: true,
+    of: |limits| limits.array_power_max_w,
+    value: |at| Some(at.array_power_w()),
+    ..SIZE
 };
 
 /// Limits that follow from more than the coil's design file.
@@ -224,7 +269,7 @@ const IMPLIED: Limit = Limit {
 };
 
 /// Every limit, in the order of [`LimitName`].
-pub static LIMITS: [Limit; 23] = [
+pub static LIMITS: [Limit; 26] = [
     SIZE,
     Limit {
         name: LimitName::InnerDiameter,
@@ -332,18 +377,26 @@ pub static LIMITS: [Limit; 23] = [
         value: |at| at.footprint_m(),
         ..SIZE
     },
+    HEAT_OF_ALL,
     Limit {
-        name: LimitName::ArrayPower,
-        key: "array_power_w",
-        design_key: "limits.array_power_max_w",
-        label: "heat of all coils",
-        unit: "W",
-        written: ("W", 1.0),
-        step: ("W", 1.0),
-        of_array: true,
-        of: |limits| limits.array_power_max_w,
-        value: |at| Some(at.array_power_w()),
-        ..SIZE
+        name: LimitName::StaticPower,
+        key: "static_power_w",
+        design_key: "limits.static_power_max_w",
+        label: "heat at static currents",
+        of_shapes: true,
+        of: |limits| limits.static_power_max_w,
+        value: |at| at.used.static_w,
+        ..HEAT_OF_ALL
+    },
+    Limit {
+        name: LimitName::FeedbackPower,
+        key: "feedback_power_w",
+        design_key: "limits.feedback_power_max_w",
+        label: "heat with feedback",
+        of_shapes: true,
+        of: |limits| limits.feedback_power_max_w,
+        value: |at| at.used.feedback_w,
+        ..HEAT_OF_ALL
     },
     Limit {
         name: LimitName::ArrayMass,
@@ -369,6 +422,19 @@ pub static LIMITS: [Limit; 23] = [
         of_array: true,
         of: |limits| limits.array_settling_max_s,
         value: |at| Some(at.settling_s(at.array_inductance_h?)),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::ArrayCost,
+        key: "array_cost",
+        design_key: "limits.array_cost_max",
+        label: "cost of all coils",
+        unit: "",
+        written: ("", 1.0),
+        step: ("", 1.0),
+        of_array: true,
+        of: |limits| limits.array_cost_max,
+        value: |at| Some(at.array_cost()),
         ..SIZE
     },
     Limit {
@@ -535,6 +601,12 @@ pub struct LimitCheck {
     pub limit: f64,
     /// Whether the value respects the limit; equality does.
     pub met: bool,
+}
+
+/// The limits that a design names whose values follow from shapes.
+pub fn of_shapes(limits: &Limits) -> impl Iterator<Item = &'static Limit> {
+    let named = LIMITS.iter().filter(|row| row.of_shapes);
+    named.filter(|row| (row.of)(limits).is_some())
 }
 
 /// Every limit that the coil's design names, by the names that artefacts use, and `winding_fill`.

@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::array::{TOUCHING, overlaps};
 use super::diagnostics::Fault;
 use super::draft::{Draft, Need};
+use super::limits::Prices;
 use super::message_text::{number, twelve_digits};
 use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
@@ -29,10 +30,19 @@ pub(super) fn check(draft: &Draft, need: Need, sink: &Sink) {
     if let Some(core) = &draft.core {
         core_fits(core, draft.coil.as_ref(), sink);
     }
+    prices(draft, sink);
     array_overlap(draft, need, sink);
     lists(draft, sink);
     target(draft, need, sink);
     workspace(draft, need, sink);
+}
+
+/// A limit on a cost that nothing adds to would always be met.
+fn prices(draft: &Draft, sink: &Sink) {
+    if draft.limits.array_cost_max.is_some() && draft.prices == Prices::default() {
+        let fault = Fault::error("limits.array_cost_max", "there are no prices to add up");
+        sink.add(fault.help("add [cost] with per_coil, wire_per_kg or steel_per_kg"));
+    }
 }
 
 /// `a > b` by more than rounding.

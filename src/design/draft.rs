@@ -1,7 +1,7 @@
 //! The sections of a design file as read, in the file's units, and which of them a command needs.
 
 use super::iron::{self, Iron, Plate};
-use super::limits::{self, Limits};
+use super::limits::{self, Limits, Prices};
 use super::reader::{Located, Section};
 use super::search::{self, SearchSpace};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
@@ -88,6 +88,7 @@ pub(super) struct Draft {
     pub(super) magnet: MagnetDraft,
     pub(super) supply: SupplyDraft,
     pub(super) limits: Limits,
+    pub(super) prices: Prices,
     pub(super) cooling: Cooling,
     pub(super) uncertainty: Uncertainty,
     pub(super) target_height: Located<f64>,
@@ -118,6 +119,7 @@ impl Draft {
             magnet: sections::magnet(root.section("magnet")),
             supply: sections::supply(root.section("supply")),
             limits: limits::read(root.section("limits")),
+            prices: limits::prices(root.section("cost")),
             cooling: sections::cooling(root.section("cooling")),
             uncertainty: sections::uncertainty(root.section("uncertainty")),
             target_height: sections::target_height_mm(root.section("target")),

@@ -13,7 +13,7 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[plate]\n[[iron]]\n[array]\n[magnet]\n[supply]\n[limits]\n\
-                            [cooling]\n[uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
+                            [cost]\n[cooling]\n[uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
                             [search.core]\n[search.plate]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
@@ -199,12 +199,33 @@ const MEANINGS: &[(&str, &str)] = &[
         "heat of all coils at the largest currents that the supply allows",
     ),
     (
+        "limits.static_power_max_w",
+        "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes",
+    ),
+    (
+        "limits.feedback_power_max_w",
+        "mean heat of all coils over that shape with position feedback, currents of least power; known only with shapes",
+    ),
+    (
         "limits.array_mass_max_kg",
         "mass of all coils, cores and the plate",
     ),
     (
         "limits.array_settling_max_ms",
         "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`",
+    ),
+    (
+        "limits.array_cost_max",
+        "cost of all coils, cores and the plate by `[cost]`",
+    ),
+    (
+        "cost.per_coil",
+        "price of a coil whatever its size (bobbin, driver, work), in any currency",
+    ),
+    ("cost.wire_per_kg", "price of a kilogram of wire"),
+    (
+        "cost.steel_per_kg",
+        "price of a kilogram of cores and plate",
     ),
     (
         "cooling.surface_w_per_m2_k",

@@ -55,5 +55,5 @@ pub use sections::{SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
 pub use draft::Need;
-pub use limits::Limits;
+pub use limits::{Limits, Prices};
 pub use model::*;

@@ -1,4 +1,4 @@
-//! `[limits]`: what a coil may be, each optional.
+//! `[limits]`: what a coil and an array may be, each optional; `[cost]`: what they are made of costs.
 
 use super::reader::Section;
 use super::rule::{BODY_MM, Bound, Rule, slip};
@@ -29,10 +29,27 @@ pub struct Limits {
     pub footprint_max_m: Option<f64>,
     /// Heat of all coils at their largest currents, W.
     pub array_power_max_w: Option<f64>,
+    /// Heat of all coils at the static currents of the shape that takes most, W.
+    pub static_power_max_w: Option<f64>,
+    /// Mean heat of all coils with position feedback over the shape that takes most, W.
+    pub feedback_power_max_w: Option<f64>,
     /// Mass of all coils with their cores, kg.
     pub array_mass_max_kg: Option<f64>,
     /// Five time constants of the slowest pattern of currents in the array, s.
     pub array_settling_max_s: Option<f64>,
+    /// Cost of all coils, cores and the plate, in the currency of [`Prices`].
+    pub array_cost_max: Option<f64>,
+}
+
+/// Prices in any one currency; 0 where the design names none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Prices {
+    /// Of a coil whatever its size: its bobbin, driver and work.
+    pub per_coil: f64,
+    /// Of a kilogram of wire.
+    pub wire_per_kg: f64,
+    /// Of a kilogram of steel.
+    pub steel_per_kg: f64,
 }
 
 const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
@@ -52,9 +69,27 @@ pub(crate) fn read(mut s: Section<'_>) -> Limits {
         core_field_max_t: limit("core_field_max_t", Rule::any("T")),
         footprint_max_m: limit("footprint_max_mm", BODY_MM).map(m_from_mm),
         array_power_max_w: limit("array_power_max_w", Rule::any("W")),
+        static_power_max_w: limit("static_power_max_w", Rule::any("W")),
+        feedback_power_max_w: limit("feedback_power_max_w", Rule::any("W")),
         array_mass_max_kg: limit("array_mass_max_kg", Rule::any("kg")),
         array_settling_max_s: limit("array_settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
+        array_cost_max: limit("array_cost_max", Rule::any("")),
     };
     s.finish();
     limits
+}
+
+/// Reads `[cost]`.
+pub(crate) fn prices(mut s: Section<'_>) -> Prices {
+    let mut price = |key| {
+        let given = s.number(key, &Rule::any("").bound(Bound::NotNegative));
+        given.map_or(0.0, |price| price.value)
+    };
+    let prices = Prices {
+        per_coil: price("per_coil"),
+        wire_per_kg: price("wire_per_kg"),
+        steel_per_kg: price("steel_per_kg"),
+    };
+    s.finish();
+    prices
 }

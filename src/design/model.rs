@@ -2,7 +2,7 @@
 
 use super::iron::{Iron, IronShape, Plate};
 use super::key::Assumed;
-use super::limits::Limits;
+use super::limits::{Limits, Prices};
 use super::named_file::{NamedFile, Role};
 use super::search::SearchSpace;
 use std::path::PathBuf;
@@ -33,6 +33,8 @@ pub struct Design {
     pub magnet: Magnet,
     /// Current and voltage limits.
     pub supply: Supply,
+    /// What coils are made of costs.
+    pub prices: Prices,
     /// How the coils lose heat.
     pub cooling: Cooling,
     /// Uncertainties of the display in use.

@@ -94,6 +94,7 @@ impl Draft {
             magnet: magnet_m(&self.magnet),
             supply: supply_of(self.supply, coils),
             limits: self.limits,
+            prices: self.prices,
             cooling: self.cooling,
             uncertainty: self.uncertainty,
             target_height_m: m_from_mm(self.target_height.value),

@@ -1,4 +1,4 @@
-//! Upper bounds of lambda_jnd over all forces between two that are known.
+//! lambda_jnd over forces that change: its slope, and upper bounds over all forces between two that are known.
 //!
 //! A force constant lambda is above lambda_jnd where `e*(lambda) / lambda^2 > e_0 + w^2 <h^2>`, e_0 being
 //! the least error without the drivers' size per unit of lambda^2 and `<>` the mean over the points. Of
@@ -15,6 +15,13 @@
 //! the means of both ends' solutions, so what is lost falls with the length of the line, and with its square
 //! where every coil is at a limit: the maximum over the currents of a coil between its limits has a kink. The
 //! departure of the true forces from the line counts at its largest.
+//!
+//! The slope follows from the same currents: lambda_jnd is where `e*(lambda) = lambda^2 (e_0 + w^2 <h^2>)`, and of
+//! either least error only the forces change to first order, not the currents (envelope theorem):
+//!
+//! ```text
+//! d lambda = (<r dG I> - lambda^2 <s dG y>) / (<r h> - lambda (e_0 + w^2 <h^2>)),   r = lambda h - G I,  s = h - G y.
+//! ```
 
 use fluxform_numerics::real::Real;
 
@@ -84,6 +91,37 @@ pub fn jnd_currents(
             })
             .collect(),
     }))
+}
+
+impl JndCurrents {
+    /// The change of lambda_jnd, N/m, to first order where the forces of `problem` change by `change_n_per_a`, [point,
+    /// coil]; a derivative from either side where a breakpoint of the path lies there.
+    #[must_use]
+    pub fn slope_n_per_m(
+        &self,
+        problem: &ForceProblem,
+        jnd_weight: f64,
+        change_n_per_a: &[f64],
+    ) -> f64 {
+        let (lambda, coils) = (self.lambda_n_per_m, problem.coils());
+        let times = |row: &[f64], currents: &[f64]| -> f64 {
+            row.iter().zip(currents).map(|(g, i)| g * i).sum()
+        };
+        let rows = problem.forces_n_per_a.chunks_exact(coils);
+        let changes = change_n_per_a.chunks_exact(coils);
+        let (mut given, mut along) = (0.0, 0.0);
+        for (j, ((row, change), h)) in rows.zip(changes).zip(problem.height_m).enumerate() {
+            let weight = problem.weights.map_or(1.0, |weights| weights[j]);
+            let limited = lambda * h - times(row, &self.limited_a);
+            let unlimited = h - times(row, &self.unlimited_a_per_n_per_m);
+            given += weight
+                * (limited * times(change, &self.limited_a)
+                    - lambda * lambda * unlimited * times(change, &self.unlimited_a_per_n_per_m));
+            let allowed = unlimited * unlimited + jnd_weight * jnd_weight * h * h;
+            along += weight * (limited * h - lambda * allowed);
+        }
+        given / along
+    }
 }
 
 /// Two problems that differ in their forces alone, with the currents that decide either.
@@ -214,6 +252,28 @@ mod tests {
         for place in [0.6, 0.8, 1.1] {
             let share = bound([place; 2], 0.0) / lambda(place);
             assert!((0.0..1e-9).contains(&(share - 1.0)), "{place}: {share}");
+        }
+    }
+
+    /// Taylor: what the slope leaves falls with the square of the step.
+    #[test]
+    fn the_slope_leaves_a_remainder_of_second_order() {
+        let (place, step) = (0.83, 1e-5);
+        let [below, at, above] = [place - step, place, place + step].map(forces);
+        let change: Vec<f64> = above
+            .iter()
+            .zip(&below)
+            .map(|(above, below)| (above - below) / (2.0 * step))
+            .collect();
+        let problem = problem(&at);
+        let currents = jnd_currents(&problem, 0.07).unwrap().unwrap();
+        let slope = currents.slope_n_per_m(&problem, 0.07, &change);
+        assert!(slope.abs() > 0.1 * currents.lambda_n_per_m, "{slope}");
+        let left = |step: f64| lambda(place + step) - currents.lambda_n_per_m - step * slope;
+        let lefts = [8e-3, 4e-3, 2e-3, 1e-3].map(left);
+        for pair in lefts.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((1.9..2.1).contains(&order), "{lefts:?}");
         }
     }
 

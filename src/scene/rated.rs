@@ -11,7 +11,7 @@ use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
-use crate::coil::limits::{self, Evaluated, LimitCheck};
+use crate::coil::limits::{self, Evaluated, LimitCheck, UsedPower};
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 
 /// One coil alone at its rated current, SI.
@@ -137,6 +137,7 @@ impl Rated {
             mass_kg: summary.mass_kg,
             core_field_t: self.core.as_ref().map(|core| core.peak_field_t),
             array_inductance_h,
+            used: UsedPower::default(),
         });
     }
 }

@@ -102,6 +102,74 @@ fn regression_the_settling_limit_held_for_a_coil_alone() {
     assert_eq!(result["limits"]["array_settling_s"]["limit"], 0.1);
 }
 
+/// Heat by use is that of `lambda --feedback`, the cost that of the masses; `evaluate` knows no shapes and says so.
+#[test]
+fn heat_by_use_and_cost_are_limits() {
+    let place = Place::new();
+    let limited = |limits: &str| {
+        let text = place.text(SEED);
+        let text = text.replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 7.0");
+        let text = text.replace("[limits]", &format!("[limits]\n{limits}\n#"));
+        let cost = "[cost]\nper_coil = 20.0\nwire_per_kg = 15.0\nsteel_per_kg = 4.0\n";
+        place.write("limited.toml", &format!("{text}\n{cost}"));
+    };
+    let optimize = |more: &[&str]| {
+        let mut arguments = vec!["optimize", "limited.toml", "--for", FLAT];
+        arguments.extend(QUICK);
+        arguments.extend(more);
+        place.run(&arguments)
+    };
+    limited("static_power_max_w = 70\nfeedback_power_max_w = 30\narray_cost_max = 300");
+    let result = optimize(&["--out", "best.toml"]).ends(0).json();
+    let lambda = ["lambda", "best.toml", FLAT, "--feedback"];
+    let lambda = place.run(&[&lambda[..], &["--format", "json"]].concat());
+    let lambda = lambda.ends(0).json();
+    let checked = |key: &str| number(&result, &format!("limits/{key}/value"));
+    for (key, stated) in [
+        ("static_power_w", "feedback/without/power_w"),
+        ("feedback_power_w", "feedback/at_chosen/mean_power_w"),
+    ] {
+        let (ours, stated) = (checked(key), number(&lambda, stated));
+        assert!((ours / stated - 1.0).abs() < 1e-9, "{key}: {ours} {stated}");
+        assert_eq!(result["limits"][key]["met"], true);
+        assert_eq!(result["limits_given"][key]["met"], false, "{key}");
+    }
+    let run = place.run(&["evaluate", "best.toml", "--format", "json"]);
+    let alone = run.ends(0).json();
+    let warnings = alone["warnings"].to_string();
+    assert!(
+        warnings.contains("limits.static_power_max_w: not checked"),
+        "{warnings}"
+    );
+    let mass_kg = number(&alone, "coil/mass_kg");
+    let cost = number(&alone, "limits/array_cost/value");
+    assert!(
+        (cost - 9.0 * (20.0 + 15.0 * mass_kg)).abs() < 1e-9 * cost,
+        "{cost}"
+    );
+    assert_eq!(checked("array_cost"), cost);
+    place.run(&["calibrate", "best.toml", FLAT]).ends(0);
+    let page = place.read("results/seed_air_array/flat/report.html");
+    let page = String::from_utf8(page).expect("text");
+    assert!(page.contains("static power"));
+    assert!(page.contains("Not looked at here: heat with feedback"));
+    // What no array meets is named before or after it is computed.
+    limited("array_cost_max = 150");
+    let run = optimize(&[]).ends(3);
+    assert!(
+        run.err.contains("meets cost of all coils <= 150"),
+        "{}",
+        run.err
+    );
+    place.write(
+        "limited.toml",
+        &(place.text(SEED) + "[cost]\nper_coil = 0\n")
+            .replace("[limits]", "[limits]\narray_cost_max = 9\n#"),
+    );
+    let run = optimize(&[]).ends(3);
+    assert!(run.err.contains("no prices to add up"), "{}", run.err);
+}
+
 /// Nothing that is searched lets a coil settle in time: its limit is not asked of the array either.
 #[test]
 fn a_settling_limit_that_the_given_coil_misses_does_not_fail_a_search_of_the_pitch() {

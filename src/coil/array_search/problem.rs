@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use fluxform_base::progress::Interrupted;
 use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
-use fluxform_design::Design;
+use fluxform_design::{Design, Limits};
 use fluxform_numerics::mixed_search::descent::Judged;
 use fluxform_numerics::mixed_search::{MET, Problem, Variable};
 
 use super::positions::closest;
 use super::space::{Axis, Space};
 use crate::circuit::Circuit;
-use crate::limits::{Direction, Evaluated, LIMITS, LimitName, bobbin_bore_m};
+use crate::limits::{Direction, Evaluated, LIMITS, LimitName, UsedPower, bobbin_bore_m};
 
 /// How accurately a design is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +33,8 @@ pub struct Physical {
     pub inductance_h: f64,
     /// That of the array's slowest pattern of currents, H.
     pub array_inductance_h: f64,
+    /// Heat that the shapes take, as far as a limit of the design names it.
+    pub used: UsedPower,
     /// Flux density in the core at the rated current, T.
     pub core_field_t: Option<f64>,
 }
@@ -60,20 +62,27 @@ impl Physical {
         let others = [self.inductance_h, self.array_inductance_h];
         merits
             .chain(others)
+            .chain(self.used.static_w)
+            .chain(self.used.feedback_w)
             .chain(self.core_field_t)
             .map(f64::ln)
             .collect()
     }
 
-    /// From the logarithms of `shapes` merits, two inductances and a flux density.
+    /// From the logarithms of `shapes` merits, two inductances, the heat that `limits` name and a flux density.
     #[must_use]
-    pub fn of_outputs(outputs: &[f64], shapes: usize) -> Option<Self> {
-        let value = |index: usize| outputs.get(index).map(|ln| ln.exp());
+    pub fn of_outputs(outputs: &[f64], shapes: usize, limits: &Limits) -> Option<Self> {
+        let (merits, others) = outputs.split_at_checked(shapes)?;
+        let mut others = others.iter().map(|ln| ln.exp());
         Some(Self {
-            merits: outputs.get(..shapes)?.iter().map(|ln| ln.exp()).collect(),
-            inductance_h: value(shapes)?,
-            array_inductance_h: value(shapes + 1)?,
-            core_field_t: value(shapes + 2),
+            merits: merits.iter().map(|ln| ln.exp()).collect(),
+            inductance_h: others.next()?,
+            array_inductance_h: others.next()?,
+            used: UsedPower {
+                static_w: limits.static_power_max_w.and_then(|_| others.next()),
+                feedback_w: limits.feedback_power_max_w.and_then(|_| others.next()),
+            },
+            core_field_t: others.next(),
         })
     }
 }
@@ -285,7 +294,8 @@ impl<'a> ArrayProblem<'a> {
     /// The properties that the corrected outputs stand for.
     #[must_use]
     pub fn estimate(&self, outputs: &[f64]) -> Option<Physical> {
-        Physical::of_outputs(&self.corrected(outputs), self.reference_ln.len())
+        let limits = &self.space.base().limits;
+        Physical::of_outputs(&self.corrected(outputs), self.reference_ln.len(), limits)
     }
 
     /// The objective's parts: logarithms of the merits over those of the reference.
@@ -333,12 +343,14 @@ impl<'a> ArrayProblem<'a> {
         all
     }
 
-    /// Those that the design's [limits] hold.
-    fn of_table(design: &Design, physical: Option<&Physical>) -> Vec<Bounded> {
+    /// What the table of limits makes of a design, as far as `physical` lets it be known; `None` without a coil.
+    pub fn evaluated<T>(
+        design: &Design,
+        physical: Option<&Physical>,
+        of: impl FnOnce(&Evaluated<'_>) -> T,
+    ) -> Option<T> {
         let inductance_h = physical.map_or(f64::NAN, |p| p.inductance_h);
-        let Some((circuit, mass_kg)) = Self::coil(design, inductance_h) else {
-            return Vec::new();
-        };
+        let (circuit, mass_kg) = Self::coil(design, inductance_h)?;
         let most_a = design
             .supply
             .current_max_a
@@ -346,26 +358,34 @@ impl<'a> ArrayProblem<'a> {
             .copied()
             .fold(0.0, f64::max);
         let rated_a = circuit.rated_current_a(most_a, design.supply.voltage_v);
-        let at = Evaluated {
+        Some(of(&Evaluated {
             design,
             circuit: &circuit,
             power_w: circuit.power_w(rated_a),
             mass_kg,
             core_field_t: physical.and_then(|p| p.core_field_t),
             array_inductance_h: physical.map(|p| p.array_inductance_h),
-        };
+            used: physical.map(|p| p.used).unwrap_or_default(),
+        }))
+    }
+
+    /// Those that the design's [limits] hold.
+    fn of_table(design: &Design, physical: Option<&Physical>) -> Vec<Bounded> {
         let rows = LIMITS
             .iter()
             .filter(|row| row.name != LimitName::WindingFill);
-        let of_design = rows.filter_map(|row| {
-            let value = (row.value)(&at)?;
-            let of = match row.direction {
-                Direction::AtLeast => Bounded::at_least,
-                Direction::AtMost | Direction::Equal => Bounded::at_most,
-            };
-            Some(of(row.key, value, (row.of)(&design.limits)?).of(row.name))
-        });
-        of_design.filter(|bound| bound.value.is_finite()).collect()
+        let of_design = |at: &Evaluated<'_>| {
+            let bounds = rows.filter_map(|row| {
+                let value = (row.value)(at)?;
+                let of = match row.direction {
+                    Direction::AtLeast => Bounded::at_least,
+                    Direction::AtMost | Direction::Equal => Bounded::at_most,
+                };
+                Some(of(row.key, value, (row.of)(&design.limits)?).of(row.name))
+            });
+            bounds.filter(|bound| bound.value.is_finite()).collect()
+        };
+        Self::evaluated(design, physical, of_design).unwrap_or_default()
     }
 
     /// Bounds under which the winding can be made and the coils fit beside each other.

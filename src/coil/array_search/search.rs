@@ -121,6 +121,16 @@ impl SearchedChoice {
     }
 }
 
+/// A choice that was searched to its end beside the best one.
+pub struct Finished<'a> {
+    /// Its problem.
+    pub problem: &'a ArrayProblem<'a>,
+    /// The search over it.
+    pub search: Search<'a>,
+    /// Its best design.
+    pub best: Candidate,
+}
+
 /// The result of a search.
 pub struct Found<'a> {
     /// The problem of the best choice.
@@ -133,6 +143,10 @@ pub struct Found<'a> {
     pub evaluations: usize,
     /// Every choice that was searched.
     pub choices: Vec<SearchedChoice>,
+    /// The best choices of other numbers of coils, where these were searched to their end.
+    pub others: Vec<Finished<'a>>,
+    /// Whether every number of coils was to be searched to its end.
+    pub every_count: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -274,56 +288,54 @@ fn short(value: f64) -> String {
         .map_or(rounded, |value| value.to_string())
 }
 
-/// Searches the best choice of every number of coils but the first choice's to its end; how many arrays that took,
-/// and whether it was interrupted.
+/// Searches the best choice of every number of coils but the first choice's to its end: which these are, each with
+/// its best design, how many arrays that took, and whether it was interrupted.
 fn finish_counts(
     problems: &[ArrayProblem<'_>],
     design: &Design,
     settings: Settings,
     first: usize,
     left_out: &mut [(usize, Search<'_>)],
-) -> (usize, bool) {
+) -> (Vec<(usize, Candidate)>, usize, bool) {
     let coils = |index: usize| problems[index].space.coils();
     let (mut done, mut evaluations) = (vec![coils(first)], 0);
+    let mut finished = Vec::new();
     for (other, search) in left_out.iter_mut().rev() {
         if done.contains(&coils(*other)) {
             continue;
         }
         done.push(coils(*other));
+        let problem = &problems[*other];
         let before = search.samples().len();
         search.allow(settings.evaluations);
-        let stopped = is_stopped(|| search.run(&[problems[*other].space.given(design)]));
+        let ended = interruptible(|| {
+            search.run(&[problem.space.given(design)])?;
+            accept(problem, search)
+        });
         evaluations += search.samples().len() - before;
-        if stopped {
-            return (evaluations, true);
+        match ended.and_then(|ended| ended) {
+            Ok(best) => finished.extend(best.map(|best| (*other, best))),
+            Err(Interrupted) => return (finished, evaluations, true),
         }
     }
-    (evaluations, false)
+    (finished, evaluations, false)
 }
 
-/// Searches every problem and computes the best design to full accuracy.
-///
-/// # Errors
-/// Interruption before anything is known.
-pub fn run<'a>(
+/// Searches all that are `going` with ever more evaluations until one is left; those left out, the worst first, the
+/// evaluations, and whether it was interrupted.
+fn halved<'a>(
     problems: &'a [ArrayProblem<'a>],
     design: &Design,
-    request: &Request,
-) -> Result<Option<Found<'a>>, Interrupted> {
-    let settings = request.settings;
-    let mut going: Vec<(usize, Search<'a>)> = problems
-        .iter()
-        .enumerate()
-        .map(|(index, problem)| (index, Search::new(problem, settings)))
-        .collect();
+    settings: Settings,
+    going: &mut Vec<(usize, Search<'a>)>,
+) -> (Vec<(usize, Search<'a>)>, usize, bool) {
     let mut evaluations = 0;
-    // The worst first.
     let mut left_out: Vec<(usize, Search<'a>)> = Vec::new();
     let mut interrupted = false;
     // The better half goes on with twice as many evaluations each.
     while going.len() > 1 && !interrupted {
         let each = (settings.evaluations / (2 * going.len())).max(LEAST_EVALUATIONS);
-        for (index, search) in &mut going {
+        for (index, search) in going.iter_mut() {
             let before = search.samples().len();
             search.allow(before + each);
             interrupted = is_stopped(|| search.run(&[problems[*index].space.given(design)]));
@@ -341,6 +353,26 @@ pub fn run<'a>(
         let worse = going.split_off(going.len().div_ceil(2));
         left_out.extend(worse.into_iter().rev());
     }
+    (left_out, evaluations, interrupted)
+}
+
+/// Searches every problem and computes the best design to full accuracy.
+///
+/// # Errors
+/// Interruption before anything is known.
+pub fn run<'a>(
+    problems: &'a [ArrayProblem<'a>],
+    design: &Design,
+    request: &Request,
+) -> Result<Option<Found<'a>>, Interrupted> {
+    let settings = request.settings;
+    let mut going: Vec<(usize, Search<'a>)> = problems
+        .iter()
+        .enumerate()
+        .map(|(index, problem)| (index, Search::new(problem, settings)))
+        .collect();
+    let (mut left_out, mut evaluations, mut interrupted) =
+        halved(problems, design, settings, &mut going);
     let Some((index, mut search)) = going.into_iter().next() else {
         return Ok(None);
     };
@@ -354,8 +386,11 @@ pub fn run<'a>(
     };
     interrupted |= accepted.is_err();
     evaluations += search.samples().len() - before;
+    let mut finished = Vec::new();
     if request.every_count && !interrupted {
-        let (more, stopped) = finish_counts(problems, design, settings, index, &mut left_out);
+        let (others, more, stopped) =
+            finish_counts(problems, design, settings, index, &mut left_out);
+        finished = others;
         evaluations += more;
         interrupted = stopped;
     }
@@ -376,12 +411,23 @@ pub fn run<'a>(
             .collect();
         (best, choices)
     });
+    let others = left_out.into_iter().filter_map(|(index, search)| {
+        let at = finished.iter().position(|(other, _)| *other == index)?;
+        Some(Finished {
+            problem: &problems[index],
+            search,
+            best: finished.swap_remove(at).1,
+        })
+    });
+    let others = others.collect();
     Ok(best.map(|best| Found {
         problem,
         search,
         best,
         evaluations,
         choices,
+        others,
+        every_count: request.every_count,
         interrupted,
     }))
 }

@@ -10,10 +10,10 @@ use fluxform_design::Design;
 use fluxform_numerics::front::front;
 use fluxform_numerics::mixed_search::descent::Judged;
 use fluxform_numerics::mixed_search::surrogate::Surrogate;
-use fluxform_numerics::mixed_search::{Sample, Values};
+use fluxform_numerics::mixed_search::{Sample, Search, Values};
 
 use super::problem::{ArrayProblem, Bounded, Physical};
-use super::search::Found;
+use super::search::{Candidate, Found};
 use crate::limits::LimitName;
 
 /// A limit of the best array.
@@ -76,6 +76,8 @@ pub struct FrontPoint {
     pub value: f64,
     /// The objective.
     pub objective: f64,
+    /// Coils of the array.
+    pub coils: usize,
     /// The variables by key.
     pub values: BTreeMap<String, f64>,
 }
@@ -110,8 +112,7 @@ pub struct TradedDesign {
     pub met: bool,
     /// Whether it does but for that of each quantity.
     met_but: [bool; 3],
-    /// Whether it was computed as the best for some value of each quantity.
-    best_for: [bool; 3],
+    coils: usize,
     values: BTreeMap<String, f64>,
 }
 
@@ -122,13 +123,47 @@ const FLATTEST: f64 = 0.02;
 /// Multipliers below this are rounding.
 const ACTIVE: f64 = 1e-4;
 /// Parts of the best design's mass, heat and time for which the best is computed, from the nearest on.
-const PARTS: [&[f64]; 2] = [&[0.92, 0.8, 0.65, 0.5, 0.35, 0.25], &[1.15, 1.4]];
-/// Descents for each, every one on a surrogate that knows where the one before ended.
-const DESCENTS: usize = 2;
+const PARTS: [&[f64]; 2] = [&[0.92, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25], &[1.15, 1.4]];
+/// Descents in turn that gain less than this are the last.
+const PATIENCE: usize = 2;
+const NO_BETTER: f64 = 1e-3;
+/// Share of a range by which the starts of a descent lie apart.
+const APART: f64 = 0.2;
 /// Steps to which neighbours' lengths are rounded, mm.
 const STEPS_MM: [f64; 2] = [0.5, 1.0];
-/// Evaluations that the study may add.
-pub const MORE_EVALUATIONS: usize = 80;
+/// How much work the trade-offs are worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Evaluations that the study may add to a search.
+    pub evaluations: usize,
+    /// Descents for each value at most, every one on a surrogate that knows where the one before ended.
+    descents: usize,
+    /// Starts of each beside the end of the one before.
+    other_starts: usize,
+    /// Ways along [`PARTS`]; a second one knows what the first has computed.
+    ways: usize,
+}
+
+impl Effort {
+    /// More where the trade-offs are requested, of every number of coils.
+    #[must_use]
+    pub const fn of(every_count: bool) -> Self {
+        match every_count {
+            true => Self {
+                evaluations: 200,
+                descents: 8,
+                other_starts: 6,
+                ways: 4,
+            },
+            false => Self {
+                evaluations: 80,
+                descents: 2,
+                other_starts: 0,
+                ways: 2,
+            },
+        }
+    }
+}
 
 /// The quantities that are traded for the objective, by key.
 pub const TRADED: [(&str, LimitName); 3] = [
@@ -140,23 +175,16 @@ pub const TRADED: [(&str, LimitName); 3] = [
 /// A quantity of a design.
 fn traded(problem: &ArrayProblem, x: &[f64], physical: &Physical, name: LimitName) -> Option<f64> {
     let design = problem.space.design(x);
-    let (circuit, mass_kg) = ArrayProblem::coil(&design, physical.inductance_h)?;
-    (name.limit().value)(&crate::limits::Evaluated {
-        design: &design,
-        circuit: &circuit,
-        power_w: 0.0,
-        mass_kg,
-        core_field_t: None,
-        array_inductance_h: Some(physical.array_inductance_h),
-    })
+    ArrayProblem::evaluated(&design, Some(physical), name.limit().value)?
 }
 
-/// A view of a result that was found.
-struct View<'a, 'b> {
-    found: &'b mut Found<'a>,
+/// A search and its best design.
+struct View<'s, 'a> {
+    problem: &'a ArrayProblem<'a>,
+    search: &'s mut Search<'a>,
+    best: Candidate,
     surrogate: Surrogate,
-    /// Designs that were computed as the best for some value of each traded quantity.
-    best_for: [Vec<Vec<f64>>; 3],
+    effort: Effort,
 }
 
 /// The surroundings of `found`, compared with `design`.
@@ -164,25 +192,31 @@ struct View<'a, 'b> {
 /// # Errors
 /// Interruption.
 pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
-    let allowed = found.search.samples().len() + MORE_EVALUATIONS;
-    found.search.allow(allowed);
-    let Some(surrogate) = found.search.surrogate() else {
+    let (search, best) = (&mut found.search, found.best.clone());
+    let effort = Effort::of(found.every_count);
+    let before = search.samples().len();
+    // The same for every number of coils, so that at each the best of all is known.
+    let here = TRADED.map(|(_, name)| traded(found.problem, &best.x, &best.physical, name));
+    let Some(mut view) = View::new(found.problem, search, best, effort) else {
         return Ok(Study::default());
     };
-    let best_for = std::array::from_fn(|_| vec![found.best.x.clone()]);
-    let mut view = View {
-        found,
-        surrogate,
-        best_for,
-    };
     let limits = view.limits();
-    let before = view.found.search.samples().len();
     let variables = view.variables(design)?;
     let neighbours = view.neighbours()?;
-    view.trade()?;
-    view.found.evaluations += view.found.search.samples().len() - before;
-    let designs = view.designs();
-    let on_front = std::array::from_fn(|cost| on_front(&designs, cost));
+    view.trade(&here)?;
+    let mut designs = view.designs();
+    found.evaluations += found.search.samples().len() - before;
+    for other in &mut found.others {
+        let before = other.search.samples().len();
+        if let Some(mut view) =
+            View::new(other.problem, &mut other.search, other.best.clone(), effort)
+        {
+            view.trade(&here)?;
+            designs.extend(view.designs());
+        }
+        found.evaluations += other.search.samples().len() - before;
+    }
+    let on_front = std::array::from_fn(|cost| on_front(&designs, cost, here[cost]));
     let mut front = Vec::new();
     for ((quantity, _), (cost, on)) in TRADED.iter().zip(on_front.iter().enumerate()) {
         let on: &Vec<usize> = on;
@@ -190,6 +224,7 @@ pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupte
             quantity,
             value: designs[*index].costs[cost],
             objective: designs[*index].objective,
+            coils: designs[*index].coils,
             values: designs[*index].values.clone(),
         }));
     }
@@ -203,39 +238,45 @@ pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupte
     })
 }
 
-impl View<'_, '_> {
-    fn problem(&self) -> &ArrayProblem<'_> {
-        self.found.problem
+impl<'s, 'a> View<'s, 'a> {
+    /// `None` of a search that knows too little.
+    fn new(
+        problem: &'a ArrayProblem<'a>,
+        search: &'s mut Search<'a>,
+        best: Candidate,
+        effort: Effort,
+    ) -> Option<Self> {
+        search.allow(search.samples().len() + effort.evaluations);
+        Some(Self {
+            problem,
+            surrogate: search.surrogate()?,
+            search,
+            best,
+            effort,
+        })
     }
 
     fn named(&self, x: &[f64]) -> BTreeMap<String, f64> {
-        let made = self.problem().space.made(x);
-        self.problem()
-            .space
-            .axes()
-            .iter()
-            .map(|axis| axis.key())
-            .zip(made)
-            .collect()
+        let space = &self.problem.space;
+        space.named(&space.made(x))
     }
 
     /// The problem's own judgement of what the surrogate has.
     fn judge(&self, x: &[f64], outputs: &[f64]) -> Judged {
-        let physical = self.problem().estimate(outputs);
-        self.problem().judged(
+        let physical = self.problem.estimate(outputs);
+        self.problem.judged(
             physical.as_ref(),
-            &self.problem().bounds(x, physical.as_ref()),
+            &self.problem.bounds(x, physical.as_ref()),
         )
     }
 
     fn limits(&self) -> Vec<LimitWorth> {
-        let best = &self.found.best;
-        let whole = self.problem().space.variables().iter().enumerate();
+        let best = &self.best;
+        let whole = self.problem.space.variables().iter().enumerate();
         let whole = whole.filter(|(_, variable)| variable.values != Values::Continuous);
         let fixed: Vec<_> = whole.map(|(index, _)| (index, best.x[index])).collect();
         let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
         let ended = self
-            .found
             .search
             .climb_otherwise(&self.surrogate, &judge, &best.x, &fixed);
         let multipliers = ended.map_or_else(Vec::new, |(_, ended)| ended.multipliers);
@@ -260,27 +301,22 @@ impl View<'_, '_> {
 
     /// The objective of a design that is evaluated for it, where it meets the limits.
     fn evaluated(&mut self, x: Vec<f64>) -> Result<Option<f64>, Interrupted> {
-        self.found.search.evaluate(vec![x.clone()])?;
-        let sample = self
-            .found
-            .search
-            .samples()
-            .iter()
-            .find(|sample| sample.x == x);
-        let judged = sample.and_then(|sample| self.found.search.judged(sample));
+        self.search.evaluate(vec![x.clone()])?;
+        let sample = self.search.samples().iter().find(|sample| sample.x == x);
+        let judged = sample.and_then(|sample| self.search.judged(sample));
         // A surrogate's design may be off a limit by its own error.
         let met = judged.filter(|judged| judged.excess() <= OFF);
         Ok(met.map(|judged| judged.objective().exp()))
     }
 
     fn variables(&mut self, design: &Design) -> Result<Vec<VariableStudy>, Interrupted> {
-        let given = self.problem().space.given(design);
+        let given = self.problem.space.given(design);
         let mut all = Vec::new();
-        for (index, axis) in self.problem().space.axes().to_vec().into_iter().enumerate() {
-            let variable = self.problem().space.variables()[index].clone();
-            let x = self.found.best.x.clone();
+        for (index, axis) in self.problem.space.axes().to_vec().into_iter().enumerate() {
+            let variable = self.problem.space.variables()[index].clone();
+            let x = self.best.x.clone();
             let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
-            let search = &self.found.search;
+            let search = &self.search;
             let held =
                 search.climb_otherwise(&self.surrogate, &judge, &x, &[(index, given[index])]);
             let held = held.filter(|(_, ended)| ended.judged.excess() <= OFF);
@@ -303,12 +339,12 @@ impl View<'_, '_> {
 
     /// How far a variable can be moved while the objective loses at most a hundredth.
     fn end_of_range(&self, index: usize, up: bool) -> f64 {
-        let variable = &self.problem().space.variables()[index];
+        let variable = &self.problem.space.variables()[index];
         let width = variable.high - variable.low;
         let sign = if up { 1.0 } else { -1.0 };
-        let x = &self.found.best.x;
+        let x = &self.best.x;
         let surrogate = &self.surrogate;
-        let search = &self.found.search;
+        let search = &self.search;
         let here = self.judge(x, &surrogate.at(&search.units(x))).objective();
         let judge = |x: &[f64], outputs: &[f64]| {
             let mut judged = self.judge(x, outputs);
@@ -332,9 +368,9 @@ impl View<'_, '_> {
     fn neighbours(&mut self) -> Result<Vec<Neighbour>, Interrupted> {
         let mut all = Vec::new();
         for step in STEPS_MM {
-            let mut x = self.found.best.x.clone();
+            let mut x = self.best.x.clone();
             let mut fixed: Vec<(usize, f64)> = Vec::new();
-            let variables = self.problem().space.variables().to_vec();
+            let variables = self.problem.space.variables().to_vec();
             let continuous = variables
                 .iter()
                 .enumerate()
@@ -350,12 +386,9 @@ impl View<'_, '_> {
                     .filter(|v| (variable.low..=variable.high).contains(*v))
                     .filter_map(|v| {
                         let held: Vec<_> = fixed.iter().copied().chain([(index, *v)]).collect();
-                        let ended = self.found.search.climb_otherwise(
-                            &self.surrogate,
-                            &judge,
-                            &x,
-                            &held,
-                        )?;
+                        let ended =
+                            self.search
+                                .climb_otherwise(&self.surrogate, &judge, &x, &held)?;
                         Some((ended.1.judged.merit(), *v, ended.0))
                     });
                 let Some((_, value, at)) = tried.reduce(|a, b| if b.0 > a.0 { b } else { a })
@@ -378,57 +411,115 @@ impl View<'_, '_> {
     }
 
     /// Computes the best designs of less and more mass, heat and time, one from the next.
-    fn trade(&mut self) -> Result<(), Interrupted> {
-        for (cost, (_, name)) in TRADED.into_iter().enumerate() {
-            let best = &self.found.best;
-            let Some(here) = traded(self.problem(), &best.x, &best.physical, name) else {
-                continue;
-            };
-            for parts in PARTS {
-                let mut x = self.found.best.x.clone();
-                for most in parts.iter().map(|part| part * here) {
-                    for _ in 0..DESCENTS {
-                        let Some(next) = self.best_below(&x, name, most) else {
-                            break;
-                        };
-                        if next == x {
-                            break;
-                        }
-                        self.found.search.evaluate(vec![next.clone()])?;
-                        let made = self.problem().space.made(&next);
-                        self.best_for[cost].push(made);
-                        if let Some(surrogate) = self.found.search.surrogate() {
-                            self.surrogate = surrogate;
-                        }
-                        x = next;
-                    }
+    fn trade(&mut self, here: &[Option<f64>; 3]) -> Result<(), Interrupted> {
+        for (cost, here) in here.iter().enumerate() {
+            let Some(here) = here else { continue };
+            for parts in [PARTS; 2].into_iter().flatten().take(self.effort.ways) {
+                let mut x = self.best.x.clone();
+                for part in parts {
+                    x = self.trade_below(x, cost, part * here)?;
                 }
             }
         }
         Ok(())
     }
 
-    /// By the surrogate the best design of which a quantity is `most` at most instead of its own limit.
+    /// Computes the best design of which a quantity is `most` at most, every time by a surrogate that knows the one
+    /// before, until it is no better; `from` where there is none.
+    fn trade_below(
+        &mut self,
+        from: Vec<f64>,
+        cost: usize,
+        most: f64,
+    ) -> Result<Vec<f64>, Interrupted> {
+        let (_, name) = TRADED[cost];
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        let mut no_better = 0;
+        for _ in 0..self.effort.descents {
+            let x = best.as_ref().map_or(&from, |(_, x)| x);
+            let next = self.best_below(x, name, most).filter(|next| next != x);
+            let Some(next) = next else { break };
+            self.search.evaluate(vec![next.clone()])?;
+            if let Some(surrogate) = self.search.surrogate() {
+                self.surrogate = surrogate;
+            }
+            let computed = self.search.samples().iter().find(|s| s.x == next);
+            let outputs = computed.and_then(|sample| sample.outputs.as_ref());
+            let merit = outputs.map_or(f64::NEG_INFINITY, |all| {
+                self.judge_below(&next, all, name, most).merit()
+            });
+            let before = best.as_ref().map_or(f64::NEG_INFINITY, |(merit, _)| *merit);
+            no_better = match merit > before + NO_BETTER {
+                true => 0,
+                false => no_better + 1,
+            };
+            if merit > before {
+                best = Some((merit, next));
+            }
+            if no_better == PATIENCE {
+                break;
+            }
+        }
+        Ok(best.map_or(from, |(_, x)| x))
+    }
+
+    /// What the problem's judgement is where a quantity is `most` at most instead of its own limit.
+    fn judge_below(&self, x: &[f64], outputs: &[f64], name: LimitName, most: f64) -> Judged {
+        let physical = self.problem.estimate(outputs);
+        let mut bounds = self.problem.bounds(x, physical.as_ref());
+        bounds.retain(|bound| bound.name != Some(name));
+        let mut judged = self.problem.judged(physical.as_ref(), &bounds);
+        let value = physical.and_then(|p| traded(self.problem, x, &p, name));
+        judged.limits.push((value.unwrap_or(f64::NAN) / most).ln());
+        judged
+    }
+
+    /// The best design by the surrogate under that judgement.
     fn best_below(&self, from: &[f64], name: LimitName, most: f64) -> Option<Vec<f64>> {
-        let judge = |x: &[f64], outputs: &[f64]| {
-            let physical = self.problem().estimate(outputs);
-            let mut bounds = self.problem().bounds(x, physical.as_ref());
-            bounds.retain(|bound| bound.name != Some(name));
-            let mut judged = self.problem().judged(physical.as_ref(), &bounds);
-            let value = physical.and_then(|p| traded(self.problem(), x, &p, name));
-            judged.limits.push((value.unwrap_or(f64::NAN) / most).ln());
-            judged
-        };
-        let search = &self.found.search;
-        let ended = search.climb_otherwise(&self.surrogate, &judge, from, &[])?;
-        (ended.1.judged.excess() <= OFF).then_some(ended.0)
+        let judge = |x: &[f64], outputs: &[f64]| self.judge_below(x, outputs, name, most);
+        let ends = self.starts(from, &judge).into_iter().filter_map(|start| {
+            let search = &self.search;
+            search.climb_otherwise(&self.surrogate, &judge, &start, &[])
+        });
+        let met = ends.filter(|(_, ended)| ended.judged.excess() <= OFF);
+        let best = met.reduce(|a, b| {
+            if b.1.judged.merit() > a.1.judged.merit() {
+                b
+            } else {
+                a
+            }
+        });
+        best.map(|(x, _)| x)
+    }
+
+    /// `from` and the best computed designs that lie apart from it and each other: what costs less may lie in another
+    /// valley.
+    fn starts(&self, from: &[f64], judge: &dyn Fn(&[f64], &[f64]) -> Judged) -> Vec<Vec<f64>> {
+        let search = &self.search;
+        let known = search.samples().iter();
+        let mut rated: Vec<(f64, &Vec<f64>)> = known
+            .filter_map(|s| Some((judge(&s.x, s.outputs.as_ref()?).merit(), &s.x)))
+            .filter(|(merit, _)| merit.is_finite())
+            .collect();
+        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut starts = vec![from.to_vec()];
+        for (_, x) in rated {
+            let u = search.units(x);
+            let apart = |other: &Vec<f64>| {
+                let other = search.units(other);
+                u.iter().zip(&other).any(|(a, b)| (a - b).abs() > APART)
+            };
+            if starts.len() <= self.effort.other_starts && starts.iter().all(apart) {
+                starts.push(x.clone());
+            }
+        }
+        starts
     }
 
     /// Every design that was computed.
     fn designs(&self) -> Vec<TradedDesign> {
-        let problem = self.problem();
+        let problem = self.problem;
         let design = |sample: &Sample| {
-            let made = problem.space.made(&sample.x);
             let physical = problem.estimate(sample.outputs.as_ref()?)?;
             let bounds = problem.bounds(&sample.x, Some(&physical));
             let met_but = TRADED.map(|(_, name)| {
@@ -441,26 +532,21 @@ impl View<'_, '_> {
             };
             let judged = problem.judged(Some(&physical), &bounds);
             Some(TradedDesign {
+                coils: problem.space.coils(),
                 objective: judged.objective().exp(),
                 costs: [mass, power, settling],
                 met: bounds.iter().all(Bounded::is_met),
                 met_but,
-                best_for: std::array::from_fn(|cost| self.best_for[cost].contains(&made)),
                 values: self.named(&sample.x),
             })
         };
-        self.found
-            .search
-            .samples()
-            .iter()
-            .filter_map(design)
-            .collect()
+        self.search.samples().iter().filter_map(design).collect()
     }
 }
 
-/// Of the designs that meet all limits but that of one cost those that nothing beats, as far as they were
-/// computed for it: others that nothing happens to beat are not the best for what they cost.
-fn on_front(designs: &[TradedDesign], cost: usize) -> Vec<usize> {
+/// For every part of `here`, what the best design costs, the best of the designs that cost at most so much and meet all limits but that of the cost,
+/// ascending: others that nothing happens to beat are not the best for what they cost.
+fn on_front(designs: &[TradedDesign], cost: usize, here: Option<f64>) -> Vec<usize> {
     let met: Vec<usize> = (0..designs.len())
         .filter(|index| designs[*index].met_but[cost])
         .collect();
@@ -468,10 +554,18 @@ fn on_front(designs: &[TradedDesign], cost: usize) -> Vec<usize> {
         .iter()
         .map(|index| [designs[*index].costs[cost], designs[*index].objective])
         .collect();
-    let unbeaten = front(&points).into_iter().map(|index| met[index]);
-    unbeaten
-        .filter(|index| designs[*index].best_for[cost])
-        .collect()
+    let unbeaten = front(&points);
+    let parts = PARTS.into_iter().flatten().chain(&[1.0]);
+    let targets = here
+        .into_iter()
+        .flat_map(|here| parts.clone().map(move |part| part * here));
+    let mut on: Vec<usize> = targets
+        .map(|most| unbeaten.partition_point(|at| points[*at][0] <= most * (1.0 + OFF)))
+        .filter(|below| *below > 0)
+        .collect();
+    on.sort_unstable();
+    on.dedup();
+    on.iter().map(|below| met[unbeaten[below - 1]]).collect()
 }
 
 /// Excess that is the surrogate's error.

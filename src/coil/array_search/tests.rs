@@ -35,6 +35,7 @@ impl Physics for OnAxis {
             merits: vec![field.dbz_dz.abs() / height_m],
             inductance_h,
             array_inductance_h: inductance_h,
+            used: Default::default(),
             core_field_t: None,
         }))
     }
@@ -190,4 +191,54 @@ fn limits_that_no_design_meets_are_named_before_anything_is_computed() {
         .to_string();
     let named = "meets outer diameter <= 38 mm and search.coil.outer_diameter_mm >= 45 mm;";
     assert!(refused.contains(named), "{refused}");
+}
+
+/// Two coils are felt better than one, and settle later.
+struct MoreCoilsSettleLater;
+
+impl Physics for MoreCoilsSettleLater {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let coils = design.array.positions_m.len() as f64;
+        let one = OnAxis.compute(design, raised_m, level)?;
+        Ok(one.map(|one| Physical {
+            merits: one.merits.iter().map(|merit| merit * coils).collect(),
+            array_inductance_h: one.array_inductance_h * coils.powi(3),
+            ..one
+        }))
+    }
+}
+
+/// The front along settling held the best number of coils alone, which is not the best of a short time.
+#[test]
+fn regression_the_trade_offs_were_those_of_one_number_of_coils() {
+    let array = "[array]\nrows = 1\ncolumns = 1\npitch_mm = 50.0\n";
+    let design = design(&format!(
+        "array_settling_max_ms = 60.0\n{array}{ONE_COIL}array.columns = [1, 2]\n"
+    ));
+    let request = Request {
+        every_count: true,
+        ..request()
+    };
+    let all = problems(&design, &request, &[1.0], &MoreCoilsSettleLater).expect("a search");
+    let mut found = run(&all, &design, &request)
+        .expect("not interrupted")
+        .expect("a design");
+    assert_eq!(found.problem.space.coils(), 2);
+    let study = study(&mut found, &design).expect("not interrupted");
+    let along = |quantity: &str| -> Vec<_> {
+        let front = study.front.iter();
+        front.filter(|point| point.quantity == quantity).collect()
+    };
+    let settling = along("array_settling_s");
+    let (first, last) = (settling[0], settling[settling.len() - 1]);
+    assert!(first.coils == 1 && last.coils == 2, "{settling:?}");
+    let rises = |pair: &[&super::study::FrontPoint]| {
+        pair[0].value < pair[1].value && pair[0].objective < pair[1].objective
+    };
+    assert!(settling.windows(2).all(rises), "{settling:?}");
 }

@@ -292,13 +292,10 @@ impl<'a> Problem<'a> {
                 LimitName::WindingFill => along(1.0, [0.0; 3]),
                 LimitName::Power => product(product(current, current), resistance),
                 LimitName::Mass => {
-                    let wire = volume.times(self.strand.mass_per_volume());
-                    let core = response.core_mass_kg;
-                    let mut sum = wire;
-                    sum.value += core.value;
-                    for (slope, by_core) in sum.slope.iter_mut().zip(core.slope) {
-                        *slope += by_core;
-                    }
+                    let mut sum = volume.times(self.strand.mass_per_volume());
+                    sum.value += response.core_mass_kg.value;
+                    let slopes = sum.slope.iter_mut().zip(response.core_mass_kg.slope);
+                    slopes.for_each(|(slope, by_core)| *slope += by_core);
                     sum
                 }
                 LimitName::WireLength => volume.times(self.strand.length_per_volume()),
@@ -308,8 +305,11 @@ impl<'a> Problem<'a> {
                 // Never among the bounds: one coil does not decide them.
                 LimitName::Footprint
                 | LimitName::ArrayPower
+                | LimitName::StaticPower
+                | LimitName::FeedbackPower
                 | LimitName::ArrayMass
-                | LimitName::ArraySettling => along(f64::NAN, [0.0; 3]),
+                | LimitName::ArraySettling
+                | LimitName::ArrayCost => along(f64::NAN, [0.0; 3]),
             })
             .collect();
         Some(Rated {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::recorded;
+use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::write::BundleContent;
-use crate::coil::limits::{self, Evaluated, LimitCheck};
+use crate::coil::limits::{self, Evaluated, LimitCheck, LimitName, UsedPower};
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
@@ -66,8 +67,35 @@ fn limit_checks(
         mass_kg: circuit.wire_mass_kg + steel_kg,
         core_field_t: peak_t,
         array_inductance_h: Some(array_inductance_h),
+        used: used(scene, content.lambda),
     });
     let limited = scene.design.limits.core_field_max_t.is_some() && scene.core.is_some();
-    let unchecked = (limited && peak_t.is_none()).then_some("core field");
-    (checks, unchecked.into_iter().collect())
+    let of_steel =
+        (limited && peak_t.is_none()).then_some("core field (`fluxform evaluate` reports it)");
+    let of_shapes = limits::of_shapes(&scene.design.limits);
+    let unknown = of_shapes.filter(|row| !checks.contains_key(row.key));
+    let of_shapes = unknown.map(|row| {
+        if row.name == LimitName::FeedbackPower {
+            "heat with feedback (`fluxform lambda --feedback` reports it)"
+        } else {
+            row.label
+        }
+    });
+    let unchecked = of_steel.into_iter().chain(of_shapes);
+    let unchecked = unchecked.collect();
+    (checks, unchecked)
+}
+
+/// The heat of all coils at the chosen force constant, as far as it was computed.
+fn used(scene: &Scene, lambda: &LambdaFile) -> UsedPower {
+    let heat = |currents: &Vec<f64>| {
+        let ohm = scene.resistances_ohm();
+        currents.iter().zip(&ohm).map(|(i, ohm)| i * i * ohm).sum()
+    };
+    let feedback = lambda.feedback.as_ref();
+    let followed = feedback.and_then(|feedback| feedback.at_chosen.as_ref());
+    UsedPower {
+        static_w: lambda.currents_a.as_ref().map(heat),
+        feedback_w: followed.map(|rendered| rendered.mean_power_w),
+    }
 }

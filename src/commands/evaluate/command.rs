@@ -18,6 +18,7 @@ use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_w
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
+use crate::coil::limits::of_shapes;
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
 use crate::scene::field_slice;
@@ -85,6 +86,12 @@ impl Evaluate {
         drop(bar);
         for warning in &result.warnings {
             printer.warning(warning);
+        }
+        for limit in of_shapes(&design.limits) {
+            printer.warning(&format!(
+                "{}: not checked, as it follows from shapes; `optimize --for` checks it",
+                limit.design_key
+            ));
         }
         let json = printer.with_warnings(&result);
         let mut place = Stream::Output;

@@ -40,10 +40,7 @@ pub(super) fn section(object: &CalibratedObject) -> Section {
         let mut note =
             "One coil at its rated current, its inductance among its neighbours.".to_owned();
         if !object.unchecked.is_empty() {
-            note += &format!(
-                " Not looked at here: {}; `fluxform evaluate` reports it.",
-                object.unchecked.join(", ")
-            );
+            note += &format!(" Not looked at here: {}.", object.unchecked.join(", "));
         }
         body.element("p class=\"note\"", &note);
     }

@@ -15,7 +15,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::problem::Level;
-use crate::coil::array_search::study::MORE_EVALUATIONS;
+use crate::coil::array_search::study::Effort;
 use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
 use crate::design::template::Template;
@@ -53,8 +53,8 @@ pub struct ArrayFlags {
     /// Most arrays that the search computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
     pub evaluations: usize,
-    /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); the best of every
-    /// number of coils is then searched to its end
+    /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); every number of coils is
+    /// then searched to its end, and for each of these costs
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub front: Option<FileArgument>,
     /// Draw them here, with what limits are worth (SVG, PNG or PDF); of one coil the force around it
@@ -344,10 +344,11 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
             * design.array.positions_m.len() as f64
             * crate::scene::cost::STEEL_POINT_COIL_S;
     let evaluations = request.settings.evaluations;
+    let more = Effort::of(request.every_count).evaluations;
     format!(
-        "computes {evaluations} arrays at most and {MORE_EVALUATIONS} about the best, about {:.0} CPU s; Ctrl-C gives \
+        "computes {evaluations} arrays at most and {more} about the best, about {:.0} CPU s; Ctrl-C gives \
          the best so far",
-        (each * (evaluations + MORE_EVALUATIONS) as f64).ceil()
+        (each * (evaluations + more) as f64).ceil()
     )
 }
 

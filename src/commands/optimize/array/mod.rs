@@ -2,7 +2,7 @@
 
 pub(crate) mod command;
 mod page;
-pub(crate) mod physics;
+pub mod physics;
 mod pitch_bound;
 mod result;
 pub(crate) mod tables;
@@ -19,9 +19,10 @@ use super::Document;
 use crate::RunError;
 use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::coil::array_search::problem::{Level, Objective, Physical, Physics, Room};
+use crate::coil::array_search::problem::{ArrayProblem, Level, Objective, Physical, Physics, Room};
 use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
 use crate::coil::array_search::study::{Study, study};
+use crate::coil::limits::{self, LimitCheck};
 use crate::commands::evaluate::evaluate;
 use crate::design::search::SearchKey;
 use crate::design::template::Template;
@@ -283,7 +284,9 @@ fn result(
         let evaluation = evaluate(&best, Vec::new(), request.tolerance)?;
         warnings.extend(evaluation.warnings);
         limits = evaluation.limits;
+        limits.extend(checks_of_shapes(&best, physical));
         limits_given = evaluate(document.design, Vec::new(), request.tolerance)?.limits;
+        limits_given.extend(checks_of_shapes(document.design, given));
         let missed = limits.iter().filter(|(_, check)| !check.met);
         let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
             (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
@@ -345,6 +348,15 @@ fn result(
         design_text,
         warnings,
     })
+}
+
+/// The limits that `evaluate`, which knows no shapes, leaves out.
+fn checks_of_shapes(design: &Design, physical: &Physical) -> Vec<(&'static str, LimitCheck)> {
+    let checks = ArrayProblem::evaluated(design, Some(physical), limits::check).unwrap_or_default();
+    let of_shapes = limits::of_shapes(&design.limits);
+    of_shapes
+        .filter_map(|row| Some((row.key, *checks.get(row.key)?)))
+        .collect()
 }
 
 /// The gains that were larger than all before them, of arrays that meet every limit.

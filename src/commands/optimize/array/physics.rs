@@ -10,15 +10,18 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
 use crate::coil::array_search::problem::{Level, Physical, Physics};
+use crate::coil::limits::UsedPower;
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
 use crate::commands::discretize;
 use crate::commands::lambda::ForcePoints;
 use crate::commands::lambda::placement::Placed;
-use crate::design::Design;
+use crate::design::{Design, Limits};
 use crate::force_direction::RequestedForce;
-use crate::lambda::feedback::{Span, reachable};
-use crate::lambda::vector_feedback::{VectorProblem, reachable_vectors};
-use crate::lambda::{Criterion, ForceProblem, Settings, constant, relative_error};
+use crate::lambda::feedback::{FeedbackError, Span, reachable, render};
+use crate::lambda::vector_feedback::{
+    CurrentsOf, VectorProblem, reachable_vectors, render_vectors,
+};
+use crate::lambda::{Criterion, ForceProblem, Settings, constant, relative_error, solve};
 use crate::point_weights::Weights;
 use crate::progress::{Interrupted, Progress, Silent, interruptible};
 use crate::scene::single::Single;
@@ -296,11 +299,20 @@ impl<'a> ArrayPhysics<'a> {
             resistance_ohm: &resistance_ohm,
         };
         let (mut merits, mut vectors) = (Vec::new(), sides.as_deref());
+        let mut used = UsedPower::default();
         for (points, problem) in self.points(level).iter().zip(self.of_shapes(all, level)) {
             let own = vectors.map(|all| all.split_at(problem.points() * coils));
             vectors = own.map(|(_, others)| others);
-            match self.merit(&problem, own.map(|(own, _)| own), points)? {
-                Some(merit) if merit > 0.0 => merits.push(merit),
+            let shape = Rendering::new(problem, own.map(|(own, _)| own), points);
+            match self.merit(&shape)? {
+                Some(merit) if merit > 0.0 => {
+                    let own = self.used(&shape, merit, &design.limits)?;
+                    used = UsedPower {
+                        static_w: largest(used.static_w, own.static_w),
+                        feedback_w: largest(used.feedback_w, own.feedback_w),
+                    };
+                    merits.push(merit);
+                }
                 _ => return Ok(None),
             }
         }
@@ -315,46 +327,73 @@ impl<'a> ArrayPhysics<'a> {
                 inductance_h
             },
             array_inductance_h: slowest_inductance_h(&matrix),
+            used,
             core_field_t,
         }))
     }
 
     /// The force constant, or the inverse of the error; `None` where nothing is rendered.
-    fn merit(
-        &self,
-        problem: &ForceProblem,
-        vectors: Option<&[[f64; 3]]>,
-        points: &ForcePoints,
-    ) -> Result<Option<f64>, RunError> {
+    fn merit(&self, shape: &Rendering<'_>) -> Result<Option<f64>, RunError> {
+        let problem = &shape.problem;
         if let (Constant::Error, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
             let error = relative_error(problem, lambda_n_per_m)?;
             return Ok(error.map(|error| error.max(LEAST_ERROR).recip()));
         }
         if let Some(criterion) = self.aim.constant.criterion() {
-            let settings = Settings {
-                criterion,
-                jnd_weight: self.aim.jnd_weight,
-                at_n_per_m: None,
-            };
-            return Ok(constant(problem, &settings)?);
+            return Ok(constant(problem, &self.settings(criterion, None))?);
         }
         let mut span = Span::default();
-        let reach = match vectors {
+        let reach = match shape.vector() {
             None => reachable(problem)?,
-            Some(vectors) => {
-                let [x, y] =
-                    [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect::<Vec<f64>>());
-                let direction = points.directions(RequestedForce::default());
-                let vector = VectorProblem {
-                    upward: *problem,
-                    sides_n_per_a: [&x, &y],
-                    direction: &direction,
-                };
-                reachable_vectors(&vector).map_err(|error| RunError::Input(error.to_string()))?
-            }
+            Some(vector) => reachable_vectors(&vector).map_err(refused)?,
         };
         span.add(problem.height_m, &reach);
         Ok(span.largest().ok().map(|largest| largest.lambda_n_per_m))
+    }
+
+    fn settings(&self, criterion: Criterion, at_n_per_m: Option<f64>) -> Settings {
+        Settings {
+            criterion,
+            jnd_weight: self.aim.jnd_weight,
+            at_n_per_m,
+        }
+    }
+
+    /// The heat of all coils for a shape, as far as `limits` name it, at the force constant that is made large: as
+    /// `lambda --feedback` states both of `without` and of feedback.
+    fn used(
+        &self,
+        shape: &Rendering<'_>,
+        merit: f64,
+        limits: &Limits,
+    ) -> Result<UsedPower, RunError> {
+        let problem = &shape.problem;
+        let lambda_n_per_m = self.aim.at_n_per_m.unwrap_or(merit);
+        let fixed = || -> Result<Option<f64>, RunError> {
+            let criterion = self.aim.constant.criterion();
+            let at = criterion.is_none().then_some(lambda_n_per_m);
+            let solved = solve(problem, &self.settings(criterion.unwrap_or_default(), at))?;
+            let heat = |(amp, ohm): (&f64, &f64)| amp * amp * ohm;
+            Ok(solved.at.or(solved.chosen).map(|point| {
+                let currents = point.currents_a.iter();
+                currents.zip(problem.resistance_ohm).map(heat).sum()
+            }))
+        };
+        let followed = || match shape.vector() {
+            None => render(problem, lambda_n_per_m).map(|rendered| rendered.mean_power_w),
+            Some(vector) => render_vectors(&vector, lambda_n_per_m, CurrentsOf::Vector)
+                .map(|rendered| rendered.mean_power_w),
+        };
+        Ok(UsedPower {
+            static_w: match limits.static_power_max_w {
+                Some(_) => fixed()?,
+                None => None,
+            },
+            feedback_w: match limits.feedback_power_max_w {
+                Some(_) => Some(followed().map_err(refused)?),
+                None => None,
+            },
+        })
     }
 
     /// The computed properties, for a later run.
@@ -369,6 +408,45 @@ impl<'a> ArrayPhysics<'a> {
     pub fn remember(&self, journal: Journal) {
         *self.known.lock().unwrap_or_else(PoisonError::into_inner) = journal;
     }
+}
+
+/// A shape's points, for the upward force or for the force vector.
+struct Rendering<'a> {
+    problem: ForceProblem<'a>,
+    /// Forces along x and y, N/A; `None` of the upward force.
+    sides_n_per_a: Option<[Vec<f64>; 2]>,
+    /// The requested directions; empty of the upward force.
+    direction: Vec<[f64; 3]>,
+}
+
+impl<'a> Rendering<'a> {
+    fn new(problem: ForceProblem<'a>, vectors: Option<&[[f64; 3]]>, points: &ForcePoints) -> Self {
+        let directions = |_| points.directions(RequestedForce::default());
+        Self {
+            problem,
+            sides_n_per_a: vectors
+                .map(|vectors| [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect())),
+            direction: vectors.map(directions).unwrap_or_default(),
+        }
+    }
+
+    fn vector(&self) -> Option<VectorProblem<'_>> {
+        let [x, y] = self.sides_n_per_a.as_ref()?;
+        Some(VectorProblem {
+            upward: self.problem,
+            sides_n_per_a: [x, y],
+            direction: &self.direction,
+        })
+    }
+}
+
+/// The larger of two that may be unknown.
+fn largest(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.into_iter().chain(b).reduce(f64::max)
+}
+
+fn refused(error: FeedbackError) -> RunError {
+    RunError::Input(error.to_string())
 }
 
 impl Physics for ArrayPhysics<'_> {

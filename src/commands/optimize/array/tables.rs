@@ -6,7 +6,7 @@ use crate::coil::limits::LimitName;
 use crate::plot::pareto::{Panel, ParetoPlot};
 
 /// How the table begins.
-pub const HEAD: &str = "quantity,value,gain";
+pub const HEAD: &str = "quantity,value,gain,coils";
 
 /// Worths of limits that fit above the panels.
 const WORTHS: usize = 2;
@@ -26,10 +26,11 @@ pub fn csv(result: &ArrayOptimization) -> String {
         };
         let values: Vec<String> = keys.iter().map(value).collect();
         text.push_str(&format!(
-            "{},{},{},{}\n",
+            "{},{},{},{},{}\n",
             point.quantity,
             point.value,
             point.objective,
+            point.coils,
             values.join(",")
         ));
     }
@@ -43,7 +44,7 @@ pub fn csv(result: &ArrayOptimization) -> String {
         let values: Vec<String> = keys.iter().map(value).collect();
         if let Some(gain) = choice.objective {
             text.push_str(&format!(
-                "coils,{},{gain},{}\n",
+                "coils,{0},{gain},{0},{1}\n",
                 choice.coils,
                 values.join(",")
             ));

@@ -188,7 +188,7 @@ impl Parts {
                 core_radius_m: Some(0.011),
             },
             limits: BTreeMap::from([("resistance_ohm", missed)]),
-            unchecked: vec!["core field"],
+            unchecked: vec!["core field (`fluxform evaluate` reports it)"],
             warnings: &self.warnings,
             error_time: Some(ErrorTime {
                 curve: MeasuredCurve {
