@@ -76,7 +76,7 @@ impl System {
         tolerance: f64,
         most_entries: usize,
     ) -> Result<Self, TooMany> {
-        let (size, count) = (surface.size(), images.len());
+        let size = surface.size();
         let scales = iron.scales();
         let body = |node: usize| surface.face_of(node).body;
         let strengths: Vec<f64> = (0..size)
@@ -85,62 +85,27 @@ impl System {
                 (face.chi[0] - face.chi[1]) / scales[face.body]
             })
             .collect();
-        // Images that leave a body where it is.
-        let keeps = |body: usize, image: usize| iron.keeps(body, images[image]);
         let centres: Vec<_> = surface
             .panels()
             .iter()
             .map(|panel| panel.centre_m)
             .collect();
         let clusters = Clusters::new(&centres, |panel| surface.nodes_of(panel));
-        let threshold = COMPRESSION * tolerance / size as f64;
-        let taken = AtomicUsize::new(0);
         let assembly = Assembly {
+            iron,
             surface,
             clusters: &clusters,
             images,
-            planes_m: iron.planes_m,
             strengths: &strengths,
+            threshold: COMPRESSION * tolerance / size as f64,
+            most_entries,
+            taken: AtomicUsize::new(0),
         };
-        let rows = (0..clusters.items.len()).into_par_iter().map(|own| {
-            let mut rows: Vec<BlockRow> = (0..count)
-                .map(|_| BlockRow::with_capacity(clusters.items.len()))
-                .collect();
-            let nodes = clusters.places(own);
-            let mut whole = vec![0.0; nodes.len()];
-            for other in 0..clusters.items.len() {
-                fluxform_base::progress::poll();
-                let parts = assembly.images_of(own, other);
-                for (image, part) in parts.iter().enumerate() {
-                    for (k, column) in clusters.places(other).iter().enumerate() {
-                        for (at, node) in nodes.iter().enumerate() {
-                            if body(*column) == body(*node) && keeps(body(*node), image) {
-                                whole[at] += part[(at, k)];
-                            }
-                        }
-                    }
-                }
-                let threshold = if assembly.are_apart(own, other) {
-                    threshold
-                } else {
-                    0.0
-                };
-                for (parity, row) in rows.iter_mut().enumerate() {
-                    let mut sum = parts[0].clone();
-                    for (image, part) in parts.iter().enumerate().skip(1) {
-                        sum += part * sign(parity, image);
-                    }
-                    let entries = row.push(sum, threshold);
-                    if taken.fetch_add(entries, Relaxed) + entries > most_entries {
-                        return Err(TooMany);
-                    }
-                }
-            }
-            Ok((rows, whole))
-        });
+        let rows = (0..clusters.items.len()).into_par_iter();
+        let rows = rows.map(|cluster| assembly.rows(cluster));
         let rows = rows.collect::<Result<Vec<_>, TooMany>>()?;
         let mut diagonal = vec![0.0; size];
-        let mut matrices = vec![Blocks::default(); count];
+        let mut matrices = vec![Blocks::default(); images.len()];
         for (cluster, (rows, whole)) in rows.into_iter().enumerate() {
             for (node, whole) in clusters.places(cluster).iter().zip(whole) {
                 diagonal[*node] = 1.0 / scales[body(*node)] - whole;
@@ -149,32 +114,11 @@ impl System {
                 matrix.push(row);
             }
         }
-        let bodies = scales.len();
-        let constants = (0..count)
-            .map(|parity| {
-                (0..bodies)
-                    .filter(|body| {
-                        (0..count).all(|image| !keeps(*body, image) || sign(parity, image) > 0.0)
-                    })
-                    .map(|of| {
-                        let areas: Vec<(usize, f64)> = (0..size)
-                            .filter(|node| body(*node) == of)
-                            .map(|node| (node, norm(surface.nodes[node].area_m2)))
-                            .collect();
-                        let sum: f64 = areas.iter().map(|(_, area)| area).sum();
-                        areas
-                            .into_iter()
-                            .map(|(node, area)| (node, area / sum))
-                            .collect()
-                    })
-                    .collect()
-            })
-            .collect();
         Ok(Self {
             parities: Parities {
                 size,
-                images: count,
-                constants,
+                images: images.len(),
+                constants: constants(iron, surface, images),
                 strengths,
             },
             clusters,
@@ -306,16 +250,87 @@ impl Parities {
     }
 }
 
+/// Of every parity and body whose constant it allows: nodes with their share of its area.
+fn constants(iron: &Iron, surface: &Surface, images: &[[f64; 2]]) -> Vec<Vec<Vec<(usize, f64)>>> {
+    let allows = |parity: usize, body: usize| {
+        let mut images = images.iter().enumerate();
+        images.all(|(image, signs)| !iron.keeps(body, *signs) || sign(parity, image) > 0.0)
+    };
+    let shares = |of: usize| {
+        let own = (0..surface.size()).filter(|node| surface.face_of(*node).body == of);
+        let areas: Vec<(usize, f64)> = own
+            .map(|node| (node, norm(surface.nodes[node].area_m2)))
+            .collect();
+        let sum: f64 = areas.iter().map(|(_, area)| area).sum();
+        let share = |(node, area): (usize, f64)| (node, area / sum);
+        areas.into_iter().map(share).collect()
+    };
+    let bodies = iron.scales().len();
+    let of_parity = |parity: usize| {
+        let allowed = (0..bodies).filter(|body| allows(parity, *body));
+        allowed.map(shares).collect()
+    };
+    (0..images.len()).map(of_parity).collect()
+}
+
 /// What blocks are made of.
 struct Assembly<'a> {
+    iron: &'a Iron,
     surface: &'a Surface,
     clusters: &'a Clusters,
     images: &'a [[f64; 2]],
-    planes_m: [f64; 2],
     strengths: &'a [f64],
+    /// What an entry of a product may be off.
+    threshold: f64,
+    most_entries: usize,
+    /// Entries of all blocks so far.
+    taken: AtomicUsize,
 }
 
 impl Assembly<'_> {
+    /// The rows of every parity's blocks for a cluster, and at each of its nodes what a layer of 1 on all of its body
+    /// gives.
+    fn rows(&self, own: usize) -> Result<(Vec<BlockRow>, Vec<f64>), TooMany> {
+        let clusters = self.clusters.items.len();
+        let parities = 0..self.images.len();
+        let mut rows: Vec<BlockRow> = parities
+            .map(|_| BlockRow::with_capacity(clusters))
+            .collect();
+        let body = |node: usize| self.surface.face_of(node).body;
+        let nodes = self.clusters.places(own);
+        let mut whole = vec![0.0; nodes.len()];
+        for other in 0..clusters {
+            fluxform_base::progress::poll();
+            let parts = self.images_of(own, other);
+            for (signs, part) in self.images.iter().zip(&parts) {
+                for (k, column) in self.clusters.places(other).iter().enumerate() {
+                    for (at, node) in nodes.iter().enumerate() {
+                        // Images that leave the body where it is.
+                        if body(*column) == body(*node) && self.iron.keeps(body(*node), *signs) {
+                            whole[at] += part[(at, k)];
+                        }
+                    }
+                }
+            }
+            let threshold = if self.are_apart(own, other) {
+                self.threshold
+            } else {
+                0.0
+            };
+            for (parity, row) in rows.iter_mut().enumerate() {
+                let mut sum = parts[0].clone();
+                for (image, part) in parts.iter().enumerate().skip(1) {
+                    sum += part * sign(parity, image);
+                }
+                let entries = row.push(sum, threshold);
+                if self.taken.fetch_add(entries, Relaxed) + entries > self.most_entries {
+                    return Err(TooMany);
+                }
+            }
+        }
+        Ok((rows, whole))
+    }
+
     /// What the nodes of cluster `other` give at every image of those of `own`.
     fn images_of(&self, own: usize, other: usize) -> Vec<DMatrix<f64>> {
         let (targets, nodes) = (self.clusters.places(own), self.clusters.places(other));
@@ -325,7 +340,7 @@ impl Assembly<'_> {
             let mut part = DMatrix::zeros(targets.len(), nodes.len());
             for (at, target) in targets.iter().enumerate() {
                 row.fill(0.0);
-                let target = mirrored(&self.surface.nodes[*target], *signs, self.planes_m);
+                let target = mirrored(&self.surface.nodes[*target], *signs, self.iron.planes_m);
                 let mut first = 0;
                 for panel in &self.clusters.items[other] {
                     let count = self.surface.nodes_of(*panel).len();
@@ -363,7 +378,7 @@ impl Assembly<'_> {
                 place_m: own,
                 area_m2: [0.0; 3],
             };
-            let own = mirrored(&node, *signs, self.planes_m).place_m;
+            let own = mirrored(&node, *signs, self.iron.planes_m).place_m;
             norm(minus(own, other)) - a - b > FAR * a.max(b)
         };
         self.images.iter().all(image)
