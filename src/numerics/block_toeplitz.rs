@@ -69,6 +69,7 @@ impl BlockToeplitz {
                 })
                 .collect();
             spectrum.par_iter_mut().enumerate().for_each(|(k, block)| {
+                fluxform_base::progress::poll();
                 for (&(row, column), values) in entries.iter().zip(&transformed) {
                     let (one, other) = (values[k], values[plane.opposite(k)].conj());
                     let (first, second) = ((one + other) * 0.5, (one - other) * 0.5);
@@ -148,6 +149,7 @@ impl BlockToeplitz {
             })
             .collect();
         for (index, plane) in planes.iter().enumerate() {
+            fluxform_base::progress::poll();
             let (row, pair) = (index % self.rows, index / self.rows);
             for (cell, place) in self.places.iter().enumerate() {
                 let value = plane[*place] * scale;
@@ -167,11 +169,11 @@ impl BlockToeplitz {
         pairs: usize,
         spectra: &[Vec<Complex<f64>>],
     ) -> Vec<[Complex<f64>; 2]> {
-        fluxform_base::progress::poll();
         let blocks = &self.spectrum[start..self.spectrum.len().min(start + BESIDE)];
         // Real parts of every frequency, imaginary ones, then those of its opposite.
         let mut given = vec![DMatrix::zeros(self.columns, 4 * pairs); blocks.len()];
         for (index, plane) in spectra.iter().enumerate() {
+            fluxform_base::progress::poll();
             let (channel, pair) = (index % self.columns, index / self.columns);
             for (k, given) in given.iter_mut().enumerate() {
                 let (one, other) = (plane[start + k], plane[self.plane.opposite(start + k)]);
@@ -182,6 +184,7 @@ impl BlockToeplitz {
         }
         let mut out = vec![[Complex::default(); 2]; self.rows * pairs * blocks.len()];
         for (k, (block, given)) in blocks.iter().zip(&given).enumerate() {
+            fluxform_base::progress::poll();
             let product = block * given;
             for pair in 0..pairs {
                 for row in 0..self.rows {

@@ -37,9 +37,9 @@ pub fn gmres(
     let mut triangles: Vec<Triangle> = norms.iter().map(|n| Triangle::new(*n)).collect();
     let mut relative_residual = f64::from(u8::from(norms.iter().any(|n| *n > 0.0)));
     while relative_residual > tolerance && basis.len() <= most {
-        fluxform_base::progress::poll();
         let mut next = apply(&basis[basis.len() - 1]);
         for (column, triangle) in triangles.iter_mut().enumerate() {
+            fluxform_base::progress::poll();
             let mut entries = Vec::with_capacity(basis.len() + 1);
             for direction in &basis {
                 let direction = direction.column(column);
@@ -63,6 +63,7 @@ pub fn gmres(
     }
     let mut solutions = DMatrix::zeros(rhs.nrows(), columns);
     for (column, triangle) in triangles.iter().enumerate() {
+        fluxform_base::progress::poll();
         for (direction, share) in basis.iter().zip(triangle.solve().iter()) {
             solutions
                 .column_mut(column)

@@ -36,6 +36,7 @@ impl Factored {
             let (left, right) = factors.as_mut_slice().split_at_mut(to * size);
             let block = DMatrixView::from_slice(&left[from * size..], size, to - from);
             right.par_chunks_mut(PORTION * size).for_each(|part| {
+                fluxform_base::progress::poll();
                 let columns = part.len() / size;
                 let mut part = DMatrixViewMut::from_slice(part, size, columns);
                 exchange(&mut part, from, &exchanged);
@@ -69,6 +70,7 @@ impl Factored {
         exchange(&mut right.as_view_mut(), 0, &self.pivots);
         let blocks: Vec<usize> = (0..size).step_by(BLOCK).collect();
         for from in &blocks {
+            fluxform_base::progress::poll();
             let to = (from + BLOCK).min(size);
             let block = self.factors.columns(*from, to - from);
             let mut own = right.rows_mut(*from, to - from);
@@ -79,6 +81,7 @@ impl Factored {
             rest.gemm(-1.0, &block.rows(to, size - to), &own, 1.0);
         }
         for from in blocks.iter().rev() {
+            fluxform_base::progress::poll();
             let to = (from + BLOCK).min(size);
             let block = self.factors.columns(*from, to - from);
             let mut own = right.rows_mut(*from, to - from);

@@ -362,6 +362,7 @@ impl IronArray {
         currents_a: &[f64],
         layers: &[Vec<f64>],
     ) -> Result<Point, OnEdge> {
+        fluxform_base::progress::poll();
         let mut sum = [0.0; 3];
         for ([sx, sy], values) in self.images.iter().zip(layers) {
             let [cx, cy] = self.planes_m;
@@ -394,6 +395,7 @@ fn potentials(
     let of_winding = |drive: &usize| {
         let [x, y] = positions_m[*drive];
         let of_node = |(number, node): (usize, &Node)| {
+            fluxform_base::progress::poll();
             let [px, py, pz] = mirrored(node, signs, planes_m).place_m;
             let face = surface.face_of(number);
             let is_driven = |own: &usize| moved(positions_m, *own, signs, planes_m) == *drive;
@@ -531,6 +533,7 @@ impl IronArray {
         }
         let surface_m: Vec<Point> = nodes.iter().map(|node| node.on_surface_m).collect();
         let deep = |place: Point| {
+            fluxform_base::progress::poll();
             let far = |other: &Point| apart(place, *other) >= 0.98 * depth_m;
             surface_m.iter().all(far)
         };
@@ -538,6 +541,7 @@ impl IronArray {
             nodes.par_iter().filter(|node| deep(node.place_m)).collect();
         let mut sparse: Vec<&Candidate> = Vec::new();
         for candidate in candidates {
+            fluxform_base::progress::poll();
             let far = |other: &&Candidate| apart(candidate.place_m, other.place_m) >= 0.5 * depth_m;
             if sparse.iter().all(far) {
                 sparse.push(candidate);

@@ -219,6 +219,7 @@ impl Blocks {
             .map(|(number, row)| {
                 let mut out = DMatrix::zeros(clusters.places(number).len(), columns);
                 for (other, block) in row.iter().enumerate() {
+                    fluxform_base::progress::poll();
                     let of = clusters.places(other).len();
                     block.add_to(inner.rows(clusters.starts[other], of), &mut out);
                 }
@@ -239,6 +240,7 @@ impl Blocks {
         let size = clusters.order.len();
         let mut out = DMatrix::zeros(size, size);
         for (number, row) in self.blocks.iter().enumerate() {
+            fluxform_base::progress::poll();
             for (other, block) in row.iter().enumerate() {
                 let block = block.whole();
                 for (k, column) in clusters.places(other).iter().enumerate() {

@@ -312,6 +312,7 @@ impl Surface {
         tolerance: f64,
         out: &mut (Vec<[f64; 6]>, Vec<f64>),
     ) {
+        fluxform_base::progress::poll();
         let face = &self.faces[part.face];
         let distance = distance_m(part.centre_m[2] + part.radius_m);
         if part.sides_m[0].max(part.sides_m[1]) > DIPOLE_PANEL * distance {

@@ -102,6 +102,7 @@ impl<'a> CoreLayers<'a> {
             None => add(functions),
             Some(of_drive) => {
                 for drive in drives {
+                    fluxform_base::progress::poll();
                     add(&(functions * of_drive(*drive)));
                 }
             }
@@ -131,6 +132,7 @@ impl<'a> CoreLayers<'a> {
             return largest;
         };
         for drive in drives {
+            fluxform_base::progress::poll();
             let amplitudes = of_drive(*drive);
             let mut sums = DMatrix::zeros(nodes, self.cores);
             for wave in 0..self.waves {
@@ -153,6 +155,7 @@ impl<'a> CoreLayers<'a> {
         let of_drive = self.amplitudes.as_ref()?;
         let mut largest = vec![0.0_f64; self.patterns()];
         for drive in 0..self.drives {
+            fluxform_base::progress::poll();
             for column in of_drive(drive).column_iter() {
                 for (largest, amplitude) in largest.iter_mut().zip(column.iter()) {
                     *largest = largest.max(amplitude.abs());
@@ -169,6 +172,7 @@ impl<'a> CoreLayers<'a> {
         let rows = functions.nrows();
         let mut out = DMatrix::zeros(self.cores * rows, self.drives);
         for (drive, mut column) in out.column_iter_mut().enumerate() {
+            fluxform_base::progress::poll();
             let of_cores = functions * of_drive(drive);
             column.copy_from_slice(of_cores.as_slice());
         }

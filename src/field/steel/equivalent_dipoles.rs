@@ -374,7 +374,11 @@ fn combinations(task: &DipoleTask<'_>, dipoles: &Dipoles) -> Option<[DMatrix<f64
             *value *= largest / size;
         }
     }
-    let all = scaled.svd(false, true).v_t?;
+    if scaled.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let most = task.most();
+    let all = spanning_rows(&scaled, most / (largest.len() as f64).sqrt());
     let of_first = |count: usize| {
         let rows = all.rows(0, count);
         let (mut patterns, mut amplitudes) = (rows.transpose(), rows.into_owned());
@@ -386,7 +390,6 @@ fn combinations(task: &DipoleTask<'_>, dipoles: &Dipoles) -> Option<[DMatrix<f64
         [patterns, amplitudes]
     };
     let some = spread_over(task.layers.drives(), COMPARED_DRIVES);
-    let most = task.most();
     let holds = |count: usize| {
         let [patterns, amplitudes] = of_first(count);
         let left = &fields - (&fields * patterns) * amplitudes;
@@ -404,6 +407,33 @@ fn combinations(task: &DipoleTask<'_>, dipoles: &Dipoles) -> Option<[DMatrix<f64
         }
     }
     Some(of_first(good))
+}
+
+/// Orthonormal rows, the most important first, whose combinations give every row of `matrix` but for a
+/// remainder no longer than `most`.
+///
+/// Gram-Schmidt, what remains of the longest row next: Golub and Van Loan, Matrix Computations, 5.4.2.
+/// Unlike singular vectors, which are hardly fewer, these need no iteration that may not converge.
+fn spanning_rows(matrix: &DMatrix<f64>, most: f64) -> DMatrix<f64> {
+    let mut rest = matrix.transpose();
+    let mut found = DMatrix::zeros(rest.nrows(), rest.nrows().min(rest.ncols()));
+    for count in 0..found.ncols() {
+        fluxform_base::progress::poll();
+        let norms = rest.column_iter().map(|row| row.norm()).enumerate();
+        let longest = norms.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((row, _)) = longest.filter(|(_, norm)| *norm > most) else {
+            return found.columns(0, count).transpose();
+        };
+        let mut direction = rest.column(row).into_owned();
+        // Again, as rounding leaves a share of those before.
+        let before = found.columns(0, count);
+        direction -= before * before.tr_mul(&direction);
+        direction.normalize_mut();
+        let shares = rest.tr_mul(&direction);
+        rest.ger(-1.0, &direction, &shares, 1.0);
+        found.set_column(count, &direction);
+    }
+    found.transpose()
 }
 
 /// At most `most` of `count` indices, from the first to the last.
@@ -487,4 +517,36 @@ fn distances_m(shape: CoreShape, positions_m: &[[f64; 2]], near: Near<'_>) -> Ve
         next_m *= growth;
     }
     distances_m
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::spanning_rows;
+
+    #[test]
+    fn spanning_rows_are_orthonormal_and_leave_what_they_may() {
+        // Of falling importance, and many that are nothing.
+        let entry = |i: usize, k: usize| {
+            let size = if i % 3 == 2 {
+                0.0
+            } else {
+                0.6_f64.powi(i as i32)
+            };
+            size * (1.3 + 0.7 * (i * k) as f64).sin()
+        };
+        let matrix = DMatrix::from_fn(60, 90, entry);
+        for most in [1e-3, 1e-9] {
+            let rows = spanning_rows(&matrix, most);
+            let count = rows.nrows();
+            assert!((5..40).contains(&count), "{count}");
+            let products = &rows * rows.transpose() - DMatrix::identity(count, count);
+            assert!(products.amax() < 1e-14, "{:e}", products.amax());
+            let left = &matrix - &matrix * rows.transpose() * &rows;
+            let longest = left.row_iter().map(|row| row.norm()).fold(0.0, f64::max);
+            assert!(longest <= most + 1e-14, "{longest:e} {most:e}");
+        }
+        assert_eq!(spanning_rows(&matrix, 1e3).nrows(), 0);
+    }
 }

@@ -28,6 +28,8 @@ use fluxform_numerics::gmres::gmres;
 
 /// Most applications of the exchange.
 const MOST_STEPS: usize = 120;
+/// Columns that cores answer to at a time: a few milliseconds.
+const ANSWERED: usize = 256;
 /// Drives that are solved together: memory does not grow with their number.
 const TOGETHER: usize = 32;
 /// Distances, in the smallest of two axes, from which on fewer columns do.
@@ -615,7 +617,13 @@ impl<'a> ReducedCoupling<'a> {
         let (rows, size) = (self.received.waves.len(), self.felt.waves.len());
         let received =
             received.reshape_generic(nalgebra::Dyn(rows), nalgebra::Dyn(cores * columns));
-        let felt = &self.answer * received;
+        let mut felt = DMatrix::zeros(size, cores * columns);
+        for first in (0..cores * columns).step_by(ANSWERED) {
+            fluxform_base::progress::poll();
+            let count = ANSWERED.min(cores * columns - first);
+            let received = received.columns(first, count);
+            (felt.columns_mut(first, count)).gemm(1.0, &self.answer, &received, 0.0);
+        }
         felt.reshape_generic(nalgebra::Dyn(size * cores), nalgebra::Dyn(columns))
     }
 
