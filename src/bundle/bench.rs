@@ -278,7 +278,7 @@ impl ShapeBench {
 type Column = (&'static str, fn(&Run) -> Option<f64>);
 
 /// The columns of `bench.csv` behind the shape and the knobs.
-const COLUMNS: [Column; 9] = [
+const COLUMNS: &[Column] = &[
     ("points", |run| Some(run.points as f64)),
     ("cpu_s", |run| Some(run.cpu_s)),
     ("steel_s", |run| Some(run.steel_s)),

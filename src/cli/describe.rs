@@ -135,18 +135,19 @@ pub fn chosen_by(file: &LambdaFile) -> String {
     let force_n =
         (file.rms_error_n.zip(file.relative_rms_error)).map(|(error, share)| error / share);
     let faint = force_n.is_some_and(|force_n| force_n < FAINT_FORCE_N);
-    let own = (file.jnd - FORCE_JND).abs() < 1e-12;
-    match file.criterion {
-        Criterion::Jnd if faint && own => format!(
+    if file.criterion != Criterion::Jnd || !faint {
+        by
+    } else if (file.jnd - FORCE_JND).abs() < 1e-12 {
+        format!(
             "{by}, measured at 2.5 to 10 N; below {} N {} to {} are found",
             number(FAINT_FORCE_N),
             number(least * 100.0),
             percent(most)
-        ),
-        Criterion::Jnd if faint && file.jnd == Jnd::FAINT => {
-            format!("{by}, found below {} N", number(FAINT_FORCE_N))
-        }
-        Criterion::Jnd | Criterion::Linear | Criterion::Saturation | Criterion::Maxmin => by,
+        )
+    } else if file.jnd == Jnd::FAINT {
+        format!("{by}, found below {} N", number(FAINT_FORCE_N))
+    } else {
+        by
     }
 }
 

@@ -269,7 +269,7 @@ const IMPLIED: Limit = Limit {
 };
 
 /// Every limit, in the order of [`LimitName`].
-pub static LIMITS: [Limit; 26] = [
+pub static LIMITS: &[Limit] = &[
     SIZE,
     Limit {
         name: LimitName::InnerDiameter,

@@ -7,6 +7,9 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+// For its features alone (`Cargo.toml`).
+#[cfg(feature = "tests")]
+use jsonschema as _;
 use numpy::ndarray::{Array, IntoDimension};
 use numpy::{IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;

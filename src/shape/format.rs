@@ -55,7 +55,7 @@ const fn row(
 }
 
 /// In the order of [`SurfaceFormat`].
-const TABLE: [Row; 11] = [
+const TABLE: &[Row] = &[
     row(SurfaceFormat::Stl, "STL", &["stl"], false),
     row(SurfaceFormat::Obj, "OBJ", &["obj"], false),
     row(SurfaceFormat::Ply, "PLY", &["ply"], false),

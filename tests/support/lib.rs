@@ -19,6 +19,9 @@ pub mod surface_files;
 pub mod surfaces;
 pub mod tree;
 
+// For their features alone (`Cargo.toml`).
+use {matrixmultiply as _, once_cell as _};
+
 pub use fluxform_numerics::random::Random;
 
 use std::path::{Path, PathBuf};

@@ -35,7 +35,15 @@ static INSTALLED: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
         folder.path().join("environment"),
     );
     run(Command::new("maturin")
-        .args(["build", "--quiet", "--profile", "dev", "--manifest-path"])
+        .args([
+            "build",
+            "--quiet",
+            "--profile",
+            "dev",
+            "--features",
+            "tests",
+            "--manifest-path",
+        ])
         .arg(root().join("src/python/Cargo.toml"))
         .arg("--out")
         .arg(&wheels));

@@ -57,7 +57,7 @@ macro_rules! of_iron {
 }
 
 /// Columns after `index` and the set keys.
-pub static ROW_COLUMNS: [Column; 14] = [
+pub static ROW_COLUMNS: &[Column] = &[
     of_row!("turns", Number, row => Some(row.turns)),
     of_row!("resistance_ohm", Number, row => Some(row.resistance_ohm)),
     of_row!("inductance_h", Number, row => Some(row.inductance_h)),
@@ -77,7 +77,7 @@ pub static ROW_COLUMNS: [Column; 14] = [
 ];
 
 /// Columns after those of a sweep that optimises.
-pub static OPTIMUM_COLUMNS: [Column; 8] = [
+pub static OPTIMUM_COLUMNS: &[Column] = &[
     of_optimum!("best_inner_diameter_m", Number, best => Some(best.inner_diameter_m)),
     of_optimum!("best_outer_diameter_m", Number, best => Some(best.outer_diameter_m)),
     of_optimum!("best_length_m", Number, best => Some(best.length_m)),
@@ -92,7 +92,7 @@ pub static OPTIMUM_COLUMNS: [Column; 8] = [
 ];
 
 /// Columns after those of a sweep that searches arrays; `best:KEY` of every variable follow.
-pub static ARRAY_COLUMNS: [Column; 4] = [
+pub static ARRAY_COLUMNS: &[Column] = &[
     of_array!("gain", Number, best => Some(best.gain)),
     of_array!("smallest_lambda_n_per_m", Number, best => best.lambda_n_per_m.iter().copied().reduce(f64::min)),
     of_array!("coils", Count, best => Some(best.coils)),
@@ -100,7 +100,7 @@ pub static ARRAY_COLUMNS: [Column; 4] = [
 ];
 
 /// Columns after those of a sweep of designs with a plate or other steel beyond the cores.
-pub static IRON_COLUMNS: [Column; 3] = [
+pub static IRON_COLUMNS: &[Column] = &[
     of_iron!("array_inductance_h", iron => iron.inductance_h),
     of_iron!("array_settling_s", iron => iron.settling_s),
     of_iron!("iron_peak_field_t", iron => iron.peak_field_t),
@@ -111,10 +111,10 @@ pub static IRON_COLUMNS: [Column; 3] = [
 pub fn columns(mode: Mode, has_iron: bool) -> Vec<&'static Column> {
     let of_optimum: &[Column] = match mode {
         Mode::Evaluate => &[],
-        Mode::Optimize | Mode::OptimizeWound => &OPTIMUM_COLUMNS,
-        Mode::OptimizeFor => &ARRAY_COLUMNS,
+        Mode::Optimize | Mode::OptimizeWound => OPTIMUM_COLUMNS,
+        Mode::OptimizeFor => ARRAY_COLUMNS,
     };
-    let of_iron: &[Column] = if has_iron { &IRON_COLUMNS } else { &[] };
+    let of_iron: &[Column] = if has_iron { IRON_COLUMNS } else { &[] };
     ROW_COLUMNS
         .iter()
         .chain(of_iron)

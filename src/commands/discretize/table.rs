@@ -23,7 +23,7 @@ fn flag(is: bool) -> f64 {
 }
 
 /// The columns of weighted points; of those that count alike all but the last.
-const COLUMNS: [RowColumn<Flags>; 10] = [
+const COLUMNS: &[RowColumn<Flags>] = &[
     RowColumn::written("wall", "", |p| flag(p.marks.wall)),
     RowColumn::written("rim", "", |p| flag(p.marks.rim)),
     RowColumn::written("crease", "", |p| flag(p.marks.crease.is_some())),
@@ -46,7 +46,7 @@ pub(super) fn of_grid(
         .map(|k| with_flags(point_row(points, k), points.marks[k], points.area_m2[k]));
     let columns = match weights {
         Weights::Equal => &COLUMNS[..COLUMNS.len() - 1],
-        Weights::Area => &COLUMNS[..],
+        Weights::Area => COLUMNS,
     };
     write_joined_rows(out, PointRow::COLUMNS, columns, rows)
 }
