@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Makes a scan-like face of about 500,000 triangles and calibrates it over coupled cored coils.
 
-    python3 scripts/face.py FLUXFORM FOLDER [--coils 15] [--nodes 501] [--inputs-only]
+    python3 scripts/face.py FLUXFORM FOLDER [--coils 15] [--nodes 501] [--inputs-only] [--picture]
 
 Writes face.stl, face.toml and display.toml to FOLDER, calibrates there, and prints the triangles, the
 processor and wall seconds, the memory, the size of the page and the time of a step of the C loader (best
-of 5; needs `cc`). The scan has noise of 0.05 mm, holes, and an undercut below the nose. The same surface
-every time; nothing but Python 3 is needed.
+of 5; needs `cc`); --picture draws face.png, the picture of the README, there. The scan has noise of 0.05 mm,
+holes, and an undercut below the nose. The same surface every time; nothing but Python 3 is needed.
 """
 
 import argparse
@@ -156,6 +156,7 @@ def main():
     parser.add_argument("--coils", type=int, default=15, help="along a side of the array")
     parser.add_argument("--nodes", type=int, default=501, help="of the scan along a side")
     parser.add_argument("--inputs-only", action="store_true", help="calibrate nothing")
+    parser.add_argument("--picture", action="store_true", help="draw lambda, its currents and errors")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     triangles = write_inputs(given.folder, given.coils, given.nodes)
@@ -166,6 +167,9 @@ def main():
     bundle = given.folder / "results" / "display" / "face"
     page = bundle / "report.html"
     print(f"page {page.stat().st_size / 1e6:.1f} MB")
+    if given.picture:
+        drawing = ["lambda", "display.toml", "face.toml", "--plot", "face.png"]
+        subprocess.run([given.fluxform.resolve(), *drawing], cwd=given.folder, check=True)
     print(f"step {measure_step(given.folder, bundle, given.coils) / 1e3:.2f} us")
 
 

@@ -16,6 +16,9 @@ use super::{entry, thinned};
 const PANEL_PX: [f64; 2] = [600.0, 400.0];
 /// Most coils named in the legend.
 const NAMED: usize = 12;
+/// Most coils with a line each; of more the lines are the least current, the quartiles and the largest.
+const DRAWN: usize = 36;
+const QUARTILES: usize = 4;
 /// Colours that stay apart for the colour-blind and in print.
 const RMS: &str = "#0072b2";
 const RELATIVE: &str = "#d55e00";
@@ -182,21 +185,39 @@ impl LambdaPlot {
     }
 
     fn currents(&self) -> (Vec<Plot>, Layout) {
-        let coils = self.coils();
-        let line = |coil: usize| {
-            let values = self.currents_a.iter().map(|currents| currents[coil]);
+        let ranked = (self.coils() > DRAWN).then(|| self.quartiles_a());
+        let (currents_a, title) = match &ranked {
+            None => (&self.currents_a, "static currents"),
+            Some(ranked) => (ranked, "static currents: least, quartiles, largest"),
+        };
+        let lines = currents_a.first().map_or(0, Vec::len);
+        let line = |index: usize| {
+            let values = currents_a.iter().map(|currents| currents[index]);
             let line = LinePlot::new().with_data(self.over(values).collect::<Vec<_>>());
             // Coils that carry the same lie on each other: the later ones are thinner.
-            let width = 1.2 + 2.4 * (1.0 - coil as f64 / coils as f64);
-            let colour = COILS[coil % COILS.len()];
+            let width = 1.2 + 2.4 * (1.0 - index as f64 / lines as f64);
+            let colour = COILS[index % COILS.len()];
             Plot::Line(line.with_color(colour).with_stroke_width(width))
         };
-        let values: Vec<f64> = self.currents_a.iter().flatten().copied().collect();
+        let values: Vec<f64> = currents_a.iter().flatten().copied().collect();
         let layout = self
             .over_lambda(extent(&values))
-            .with_title("static currents")
+            .with_title(title)
             .with_y_label("I / A");
-        ((0..coils).map(line).collect(), layout)
+        ((0..lines).map(line).collect(), layout)
+    }
+
+    /// Of the currents at each lambda those that a quarter, a half, three quarters of the coils stay below, and the
+    /// ends.
+    fn quartiles_a(&self) -> Vec<Vec<f64>> {
+        let of = |currents_a: &Vec<f64>| {
+            let mut sorted = currents_a.clone();
+            sorted.sort_by(f64::total_cmp);
+            (0..=QUARTILES)
+                .map(|k| sorted[k * (sorted.len() - 1) / QUARTILES])
+                .collect()
+        };
+        self.currents_a.iter().map(of).collect()
     }
 
     fn map(&self) -> (Vec<Plot>, Layout) {
@@ -394,6 +415,17 @@ mod tests {
             svg == drawing(49).drawing().svg(),
             "not the same bytes twice"
         );
+    }
+
+    #[test]
+    fn of_many_coils_the_quartiles_are_drawn() {
+        let mut many = drawing(49);
+        let coils = 4 * DRAWN + 1;
+        let falling = |lambda: f64| (0..coils).rev().map(move |k| lambda * k as f64);
+        many.currents_a = (0..40).map(|k| falling(f64::from(k)).collect()).collect();
+        let ends = many.quartiles_a()[1].clone();
+        assert_eq!(ends, [0.0, 36.0, 72.0, 108.0, 144.0]);
+        assert!(many.drawing().svg().contains("least, quartiles, largest"));
     }
 
     #[test]
