@@ -151,6 +151,44 @@ pub struct Found<'a> {
     pub interrupted: bool,
 }
 
+impl Found<'_> {
+    /// Goes on from a better design than the best one, where one has been computed since that was accepted, with at
+    /// most this many evaluations; whether a better one is accepted now.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub(super) fn go_on(&mut self, evaluations: usize) -> Result<bool, Interrupted> {
+        let value = |best: &Candidate| {
+            let judged = self.problem.judged(Some(&best.physical), &best.bounds);
+            (best.is_feasible(), judged.merit())
+        };
+        let known = value(&self.best);
+        let since = self
+            .search
+            .best()
+            .filter(|(_, judged)| judged.excess() <= MET);
+        if since.is_none_or(|(_, judged)| judged.merit() <= known.1 + WORTH) {
+            return Ok(false);
+        }
+        let before = self.search.samples().len();
+        self.search.allow(before + evaluations);
+        self.search.go_on()?;
+        let accepted = accept(self.problem, &mut self.search)?;
+        self.evaluations += self.search.samples().len() - before;
+        let Some(best) = accepted.filter(|best| value(best) > known) else {
+            return Ok(false);
+        };
+        self.best = Candidate {
+            x: self.problem.space.made(&best.x),
+            ..best
+        };
+        self.choices[0] = SearchedChoice::of(self.problem, &self.search);
+        Ok(true)
+    }
+}
+
+/// Relative gain of the objective for which the search goes on.
+const WORTH: f64 = 1e-3;
 /// Descents to the limits of full accuracy.
 const CORRECTIONS: usize = 4;
 /// Evaluations of each, at most.

@@ -116,6 +116,8 @@ pub struct TradedDesign {
     values: BTreeMap<String, f64>,
 }
 
+/// Better designs met in the surroundings of the best from which the search goes on, at most.
+const TIMES_BETTER: usize = 3;
 /// Loss of the objective that a range allows.
 const LOSS: f64 = 0.01;
 /// Weight of a range's width: limits' multipliers stay below the penalty for variables this flat.
@@ -187,11 +189,23 @@ struct View<'s, 'a> {
     effort: Effort,
 }
 
-/// The surroundings of `found`, compared with `design`.
+/// The surroundings of `found`, compared with `design`. Where a better design within the limits is met there, the search
+/// goes on from it, and they are those of what that gives.
 ///
 /// # Errors
 /// Interruption.
 pub fn study(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
+    let evaluations = Effort::of(found.every_count).evaluations;
+    for _ in 0..TIMES_BETTER {
+        let around = surroundings(found, design)?;
+        if !found.go_on(evaluations)? {
+            return Ok(around);
+        }
+    }
+    surroundings(found, design)
+}
+
+fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interrupted> {
     let (search, best) = (&mut found.search, found.best.clone());
     let effort = Effort::of(found.every_count);
     let before = search.samples().len();

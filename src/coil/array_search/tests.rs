@@ -7,7 +7,7 @@ use fluxform_design::{Design, Need};
 use fluxform_numerics::mixed_search::Settings;
 
 use super::problem::{Level, Objective, Physical, Physics, Room};
-use super::search::{Request, problems, run};
+use super::search::{Found, Request, problems, run};
 use super::study::study;
 use crate::circuit;
 use crate::inductance::self_inductance_h;
@@ -146,6 +146,55 @@ fn the_study_holds_against_what_it_says() {
             .iter()
             .any(|v| v.objective_without.is_some())
     );
+}
+
+/// A second valley of wide bores.
+struct WideIsBetter;
+
+impl Physics for WideIsBetter {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let bore_m = design
+            .coil
+            .as_ref()
+            .map_or(0.0, |coil| coil.inner_diameter_m);
+        let more = 1.0 + 9.0 * (-((bore_m - 0.033) / 2e-3).powi(2)).exp();
+        let one = OnAxis.compute(design, raised_m, level)?;
+        Ok(one.map(|one| Physical {
+            merits: one.merits.iter().map(|merit| merit * more).collect(),
+            ..one
+        }))
+    }
+}
+
+/// What was computed about the best array held a better one, which was left lying.
+#[test]
+fn regression_a_better_array_that_was_met_later_was_not_taken() {
+    let design = design(ONE_COIL);
+    let mut request = request();
+    request.settings.evaluations = 8;
+    let all = problems(&design, &request, &[1.0], &WideIsBetter).expect("a search");
+    let mut found = run(&all, &design, &request)
+        .expect("not interrupted")
+        .expect("a design");
+    let merit = |found: &Found<'_>| found.best.physical.merits[0];
+    let before = merit(&found);
+    let mut wide = found.best.x.clone();
+    wide[0] = 32.0;
+    found.search.allow(found.search.samples().len() + 1);
+    found.search.evaluate(vec![wide]).expect("not interrupted");
+    study(&mut found, &design).expect("not interrupted");
+    let (_, judged) = found.search.best().expect("a design");
+    let (best, known) = (merit(&found), judged.objective().exp());
+    assert!(
+        best > 1.5 * before && best > 0.99 * known,
+        "{before} {best} {known}"
+    );
+    assert!(found.best.is_feasible(), "{:?}", found.best.bounds);
 }
 
 /// Counts nothing, but refuses a core whose ends or sides have changed places.

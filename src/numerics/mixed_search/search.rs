@@ -249,6 +249,18 @@ impl<'a> Search<'a> {
     /// # Errors
     /// Interruption.
     pub fn refine(&mut self) -> Result<(), Interrupted> {
+        self.descend_from_best(REFINED_WIDTH)
+    }
+
+    /// Descends once more from the best design, as a start does: it was evaluated after they ended.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub fn go_on(&mut self) -> Result<(), Interrupted> {
+        self.descend_from_best(FIRST_WIDTH)
+    }
+
+    fn descend_from_best(&mut self, width: f64) -> Result<(), Interrupted> {
         if self.complete {
             return Ok(());
         }
@@ -256,7 +268,7 @@ impl<'a> Search<'a> {
         let merits = merits.filter_map(|(index, s)| Some((self.judged(s)?, index)));
         let best = merits.reduce(|a, b| if better(&b.0, &a.0) { b } else { a });
         if let Some((_, center)) = best {
-            self.descend(center, REFINED_WIDTH, self.settings.finest)?;
+            self.descend(center, width, self.settings.finest)?;
         }
         Ok(())
     }
