@@ -14,6 +14,7 @@ use crate::bundle::atomic::WriteError;
 use crate::bundle::read_bounded::digest_plain;
 use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
 use crate::progress::Progress;
+use crate::scene::cost::Cost;
 use crate::scene::sources::ShapeSource;
 
 /// The largest file that a plan names, bytes.
@@ -86,6 +87,17 @@ pub struct RunReport {
     pub inaccurate: u64,
     /// The first that failed, and why.
     pub first_failure: Option<(u64, String)>,
+}
+
+/// The time that the points `indices` of `plan` take, like the middle one of them.
+///
+/// # Errors
+/// Documents that cannot be read.
+pub fn cost(plan: &PlanFile, indices: &Range<u64>) -> Result<Option<Cost>, RunError> {
+    let shapes = plan.array.as_ref().map_or(Ok(Vec::new()), shapes)?;
+    let points = indices.end - indices.start;
+    let middle = indices.start + points / 2;
+    Ok(Sweep::new(plan, shapes)?.cost(middle, points))
 }
 
 /// Computes the points `indices` of `plan` into `folder`, in parallel, each into its own file.

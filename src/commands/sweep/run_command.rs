@@ -3,7 +3,8 @@
 use clap::Args;
 use serde::Serialize;
 
-use super::run::{Part, RunReport, run};
+use super::run::{Part, RunReport, cost, run};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -76,6 +77,7 @@ impl Run {
             (None, None) => Part::Whole,
         };
         let indices = part.indices(plan.points).map_err(Failure::Usage)?;
+        allow(cost(&plan, &indices)?, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let report = run(&plan, &out, indices.clone(), self.force, &bar)?;
         drop(bar);

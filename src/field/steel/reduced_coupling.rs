@@ -24,6 +24,7 @@ use super::response::Response;
 use super::symmetry::{Motion, motions};
 use crate::winding::Winding;
 use fluxform_numerics::block_toeplitz::BlockToeplitz;
+use fluxform_numerics::bounded_svd::svd;
 use fluxform_numerics::gmres::{Outcome, gmres};
 
 /// Most applications of the exchange.
@@ -95,6 +96,24 @@ fn norm(mode: usize, angles: usize) -> f64 {
     (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt()
 }
 
+/// The largest singular value; where it is not known, the length of the longest column, which is no more.
+fn largest_of(columns: DMatrix<f64>) -> f64 {
+    let longest = (columns.column_iter()).fold(0.0_f64, |most, column| most.max(column.norm()));
+    svd(columns, [false, false]).map_or(longest, |svd| svd.singular_values.max())
+}
+
+/// Orthonormal directions that carry `columns` but for parts below `least`; where singular values are not
+/// known, directions that carry all of them.
+fn carrying(columns: DMatrix<f64>, least: f64) -> DMatrix<f64> {
+    let whole = || columns.clone().qr().q();
+    let Some(svd) = svd(columns.clone(), [true, false]) else {
+        return whole();
+    };
+    // Sorted by falling singular value.
+    let large = svd.singular_values.iter().filter(|s| **s > least);
+    (svd.u.as_ref()).map_or_else(whole, |u| u.columns(0, large.count()).into_owned())
+}
+
 impl Basis {
     /// Waves that carry all columns of `examples`, one matrix for each of [`DISTANCES`], but for parts
     /// below `cut` of the largest; `constant` is put first.
@@ -132,18 +151,12 @@ impl Basis {
         let largest = parts[parts.len() - modes..]
             .iter()
             .zip(&found)
-            .map(|(part, known)| without(part, known).singular_values().max())
+            .map(|(part, known)| largest_of(without(part, known)))
             .fold(0.0, f64::max);
         let mut counts = [0; DISTANCES.len()];
         for (distance, parts) in parts.chunks(modes).enumerate() {
             for (mode, part) in parts.iter().enumerate() {
-                let svd = without(part, &found[mode]).svd(true, false);
-                let large = svd.singular_values.iter().filter(|s| **s > cut * largest);
-                let Some(vectors) = svd.u.as_ref() else {
-                    continue;
-                };
-                // Sorted by falling singular value.
-                let more = vectors.columns(0, large.count()).into_owned();
+                let more = carrying(without(part, &found[mode]), cut * largest);
                 count = push(mode, &more);
                 let first = found[mode].ncols();
                 let known = std::mem::replace(&mut found[mode], DMatrix::zeros(0, 0));
