@@ -445,3 +445,50 @@ impl<'a> ArrayRequest<'a> {
         (drives, about)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A resolution is chosen by some drives: what is claimed holds for the others too.
+    #[test]
+    fn the_stated_error_covers_drives_that_were_not_compared() {
+        let winding = Winding {
+            inner_radius_m: 0.0026,
+            outer_radius_m: 0.0045,
+            length_m: 0.037,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.0025,
+            bottom_m: -0.041,
+            top_m: 0.0007,
+        };
+        // A lattice with two holes: no two coils are equivalent.
+        let positions_m: Vec<[f64; 2]> = (0..25)
+            .filter(|cell| ![3, 16].contains(cell))
+            .map(|cell| [0.0097 * f64::from(cell % 5), 0.0097 * f64::from(cell / 5)])
+            .collect();
+        let request = |tolerance: f64| ArrayRequest {
+            winding: &winding,
+            shape,
+            relative_permeability: 470.0,
+            positions_m: &positions_m,
+            tolerance,
+            lowest_m: 0.013,
+        };
+        let coarse = request(1e-3);
+        let blocks = coarse.drives_of_blocks();
+        assert_eq!(blocks.iter().map(Vec::len).collect::<Vec<_>>(), [8, 10, 5]);
+        let (array, truth) = (coarse.solve(&NoCache), request(1e-4).solve(&NoCache));
+        let (array, truth) = (array.unwrap(), truth.unwrap());
+        let others: Vec<usize> = blocks[1..].concat();
+        let compared = (&others[..], &positions_m[..]);
+        let error = array.difference(&truth, compared, 0.013, 1e-5).unwrap();
+        assert!(
+            error < array.relative_error && array.relative_error < 1e-3,
+            "{error:e} {:e}",
+            array.relative_error
+        );
+    }
+}
