@@ -83,6 +83,7 @@ fn three_shards_give_the_bytes_of_one_machine() {
 }
 
 #[test]
+#[allow(clippy::disallowed_methods)] // a test's own files
 fn shards_that_are_missing_or_damaged_are_solved_again() {
     let place = holed();
     let whole = merged(&place, "whole", &[]);

@@ -168,9 +168,9 @@ with_slurm() {
     say "slurm $(slurmctld -V | cut -d' ' -f2): cancelled at $before of $points points, submitted again, the same bytes"
 }
 
-# An array of 5 x 7 coupled cored coils, whose drives make two blocks.
+# An array of 5 x 9 coupled cored coils, whose drives make two blocks.
 write_array() {
-    sed 's/rows = 3/rows = 5/; s/columns = 3/columns = 7/; s/, 61]/, 9]/; s/, 29]/, 5]/' \
+    sed 's/rows = 3/rows = 5/; s/columns = 3/columns = 9/; s/, 61]/, 9]/; s/, 29]/, 5]/' \
         "$root/designs/seed.toml" >wide.toml
     printf 'name = "flat"\nprimitive = "flat"\n[points]\nx_mm = [-50.0, 50.0, 9]\ny_mm = [-50.0, 50.0, 9]\n' >flat.toml
     "$fluxform" -q calibrate wide.toml flat.toml --tolerance 1e-2 --threads 1 --out array_whole

@@ -36,6 +36,8 @@ const MODES_NEAR: usize = 2;
 /// about which, in the smallest of two.
 const MOST_COMPARED: usize = 8;
 const BESIDE: f64 = 1.6;
+/// Drives up to which all make one block: to solve a few by themselves would take longer.
+const MOST_AT_ONCE: usize = 12;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
 
@@ -181,13 +183,16 @@ impl CoupledArray {
 
 impl<'a> ArrayRequest<'a> {
     /// The drives of every block: the first holds those that are compared. None of a few cores, which are
-    /// solved at once.
+    /// solved whole.
     fn drives_of_blocks(&self) -> Vec<Vec<usize>> {
         let cores = self.positions_m.len();
         if cores <= MOST_WHOLE {
             return Vec::new();
         }
         let first = representatives(cores, &motions(self.positions_m));
+        if first.len() <= MOST_AT_ONCE {
+            return vec![first];
+        }
         let chosen = spread_over(first.len(), MOST_COMPARED);
         let compared = chosen.iter().map(|k| first[*k]).collect();
         let others: Vec<usize> = (0..first.len())
@@ -345,13 +350,18 @@ impl<'a> ArrayRequest<'a> {
     /// solved for the compared drives alone.
     fn best(&self) -> Result<Attempt<'a>, OnEdge> {
         let (drives, about) = self.compared();
+        let solved = self
+            .drives_of_blocks()
+            .into_iter()
+            .next()
+            .unwrap_or_default();
         let mut best: Option<Attempt<'a>> = None;
         for refinement in 0..=MOST_REFINEMENTS {
             let [coarse, fine] = self.resolutions(refinement);
             // Where the caps bind, two wrong solutions may agree by chance.
             let exchange = 2.0 * fine.exchange_error(self.shape, closest_m(self.positions_m));
-            let coarse = self.attempt(refinement, &coarse, &drives)?.array;
-            let mut fine = self.attempt(refinement, &fine, &drives)?;
+            let coarse = self.attempt(refinement, &coarse, &solved)?.array;
+            let mut fine = self.attempt(refinement, &fine, &solved)?;
             let compared = (&drives[..], &about[..]);
             let difference =
                 (fine.array).difference(&coarse, compared, self.lowest_m(), self.tolerance)?;
@@ -433,9 +443,11 @@ impl<'a> ArrayRequest<'a> {
     /// those of the first block, and their neighbours.
     fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
         let all = self.positions_m;
-        let Some(drives) = self.drives_of_blocks().into_iter().next() else {
+        let Some(block) = self.drives_of_blocks().into_iter().next() else {
             return ((0..all.len()).collect(), all.to_vec());
         };
+        let chosen = spread_over(block.len(), MOST_COMPARED);
+        let drives: Vec<usize> = chosen.into_iter().map(|k| block[k]).collect();
         let reach_m = BESIDE * closest_m(all);
         let beside = |[x, y]: &&[f64; 2]| {
             let apart = |drive: &usize| (all[*drive][0] - x).hypot(all[*drive][1] - y);
