@@ -50,8 +50,6 @@ use crate::scene::tolerances::ErrorTarget;
      "report first what will be computed, what left out, and what that costs"),
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --error 1% --refine --out budget",
      "points, nodes and tolerances for an error of the force of 1 %"),
-    ("fluxform calibrate display.toml face.toml --shard 1/4",
-     "a quarter of the work on many coupled coils, before a run without --shard"),
     ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
      "another criterion beside it; --force would replace what is there"),
 ]))]
@@ -80,7 +78,13 @@ pub struct Calibrate {
     /// machine or many that share OUT may solve before one without --shard. That one then writes the
     /// same bytes as alone; blocks that are missing, damaged or of another build it solves itself. Part
     /// 1 decides how finely all are solved: start it first.
-    #[arg(long, value_name = "I/N", value_parser = Part::shard, conflicts_with_all = ["no_cache", "explain"])]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "I/N",
+        value_parser = Part::shard,
+        conflicts_with_all = ["no_cache", "explain"]
+    )]
     shard: Option<Part>,
     /// Report the plan and its cost first
     ///
