@@ -143,6 +143,13 @@ impl Store {
         });
     }
 
+    /// Removes entry `name`; whether there was one.
+    pub fn forget(&self, name: &str) -> bool {
+        self.folder().is_some_and(|dir| {
+            is_entry(&dir, OsStr::new(name)) && dir.remove_file(OsStr::new(name)).is_ok()
+        })
+    }
+
     /// Removes all entries, what killed runs left there, and the folder if nothing else is in it.
     pub fn clear(&self) {
         let (Some((parent, folder)), Some(dir)) = (&self.place, self.folder()) else {

@@ -71,11 +71,19 @@ pub fn allow(
     printer: &Printer,
 ) -> Result<(), Failure> {
     let costs: Vec<Cost> = costs.into_iter().collect();
-    for cost in &costs {
-        within(cost).map_err(|message| match origin {
-            CostOrigin::Flag => Failure::Usage(message),
-            CostOrigin::Document => RunError::Input(message).into(),
-        })?;
+    announce(&costs, printer).map_err(|message| match origin {
+        CostOrigin::Flag => Failure::Usage(message),
+        CostOrigin::Document => RunError::Input(message).into(),
+    })
+}
+
+/// As [`allow`], wherever the costs come from.
+///
+/// # Errors
+/// What would take more memory than allowed, and what helps.
+pub fn announce(costs: &[Cost], printer: &Printer) -> Result<(), String> {
+    for cost in costs {
+        within(cost)?;
         if let Some((error, tolerance)) = cost.misses {
             printer.notice(&format!(
                 "{} cannot be solved to the tolerance {tolerance:.0e}: its error will be {error:.0e} at \
@@ -84,7 +92,7 @@ pub fn allow(
             ));
         }
     }
-    if let Some(message) = duration(&costs, rayon::current_num_threads()) {
+    if let Some(message) = duration(costs, rayon::current_num_threads()) {
         printer.notice(&message);
     }
     Ok(())
@@ -117,7 +125,7 @@ fn duration(costs: &[Cost], threads: usize) -> Option<String> {
 ///
 /// # Errors
 /// The memory it would take, the memory there is, and what helps.
-pub fn within(cost: &Cost) -> Result<(), String> {
+fn within(cost: &Cost) -> Result<(), String> {
     let granted = GRANTED.get().copied();
     let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);
     if cost.bytes <= budget {

@@ -6,6 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::bounded_svd::svd;
+
 /// Directions whose share of the largest is below this one are left out.
 const RANK: f64 = 1e-10;
 
@@ -43,9 +45,12 @@ impl Anderson {
                 .unzip();
             let images = DMatrix::from_columns(&images);
             let residuals = DMatrix::from_columns(&residuals);
-            let svd = residuals.svd(true, true);
-            let least = RANK * svd.singular_values.max();
-            if let Ok(shares) = svd.solve(&residual, least) {
+            // Where there are no shares this is a step of the plain iteration.
+            let shares = svd(residuals, [true, true]).and_then(|svd| {
+                let least = RANK * svd.singular_values.max();
+                svd.solve(&residual, least).ok()
+            });
+            if let Some(shares) = shares {
                 next -= images * shares;
             }
         }

@@ -31,12 +31,17 @@ fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
 }
 
-/// Which instructions kernels run on here: with others the last bits of their results differ.
+/// Which instructions kernels and products of matrices run on here: with others the last bits of their
+/// results differ.
 #[must_use]
 #[inline]
 pub fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     if has_avx2() {
+        // Products of matrices choose their own.
+        if is_x86_feature_detected!("avx512f") {
+            return "avx2 fma avx512f";
+        }
         return "avx2 fma";
     }
     "baseline"

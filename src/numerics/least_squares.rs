@@ -7,6 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::bounded_svd::svd;
+
 /// Singular values below this part of the largest are taken as zero; columns shorter than this part
 /// of the longest as without effect.
 pub const CUTOFF: f64 = 1e-5;
@@ -56,14 +58,15 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
         columns[used[k]][i] / lengths[used[k]]
     });
     let rhs = DVector::from_column_slice(b);
-    let svd = matrix.svd(true, true);
-    let (Some(u), Some(v_t)) = (&svd.u, &svd.v_t) else {
+    let Some((singular_values, u, v_t)) = with_vectors(matrix) else {
+        // Nothing is known of any combination.
+        solution.degenerate.push(used);
         return solution;
     };
-    let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
+    let largest = singular_values.iter().copied().fold(0.0, f64::max);
     let mut null_share = vec![0.0; used.len()];
     let mut variance = vec![0.0; used.len()];
-    for (k, &singular) in svd.singular_values.iter().enumerate() {
+    for (k, &singular) in singular_values.iter().enumerate() {
         let direction = v_t.row(k);
         if singular > CUTOFF * largest {
             let along = u.column(k).dot(&rhs);
@@ -95,6 +98,12 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
         }
     }
     solution
+}
+
+/// The singular values and vectors; `None` where their iteration is given up.
+fn with_vectors(matrix: DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>, DMatrix<f64>)> {
+    let svd = svd(matrix, [true, true])?;
+    Some((svd.singular_values, svd.u?, svd.v_t?))
 }
 
 /// Euclidean length.

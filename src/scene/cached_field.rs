@@ -5,6 +5,7 @@
 //! not computed. What is read is what was computed, to the bit.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::Serialize;
@@ -21,7 +22,8 @@ use crate::bundle::cache::{Origin, Store};
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
 use crate::design::Steel as Described;
-use crate::field::steel::array::CoupledArray;
+use crate::field::steel::array::{CoupledArray, MOST_WHOLE};
+use crate::field::steel::array_request::{Choice, DriveCache, SolvedBlock};
 use crate::field::steel::core_flux_density::{Inspection, peak_depth_m};
 use crate::field::steel::passive::Region;
 use crate::field::winding::OnEdge;
@@ -36,9 +38,28 @@ pub const STORE_FOLDER: &str = ".fluxform-cache";
 const MOST_NODES_HELD: usize = 8_000_000;
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
+/// Until it is there: of the resolution that was chosen for many coupled cores.
+const CHOICE: &str = "steel-choice";
+
+/// Until the steel is there: the entry of a block of the drives of many coupled cores.
+fn block(number: usize) -> String {
+    format!("steel-block-{number}")
+}
 
 /// Points and the forces at them, N/A.
 type TriedForces = (Vec<[f64; 3]>, Vec<f64>);
+
+/// A part of the drives of coupled cores, in blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SteelPart {
+    /// All blocks.
+    pub blocks: usize,
+    /// Those of the part.
+    #[serde(rename = "blocks_of_shard")]
+    pub of: usize,
+    /// Those of the part that were solved now; the others were there.
+    pub solved: usize,
+}
 
 /// Where a design's field is cached.
 #[derive(Debug)]
@@ -55,6 +76,24 @@ pub struct FieldStore {
     tried: Mutex<Vec<TriedForces>>,
     /// The last shape's map and the digest of what it was made from.
     last_map: Mutex<Option<([u8; 32], SceneMap)>>,
+}
+
+impl DriveCache for FieldStore {
+    fn choice(&self) -> Option<Choice> {
+        self.store.recall(CHOICE, &self.field)
+    }
+
+    fn keep_choice(&self, choice: &Choice) {
+        self.store.keep(CHOICE, &self.field, choice);
+    }
+
+    fn block(&self, number: usize) -> Option<SolvedBlock> {
+        self.store.recall(&block(number), &self.field)
+    }
+
+    fn keep_block(&self, number: usize, solved: &SolvedBlock) {
+        self.store.keep(&block(number), &self.field, solved);
+    }
 }
 
 impl FieldStore {
@@ -113,9 +152,59 @@ impl FieldStore {
     /// As [`steel::solve`].
     pub fn steel(&self, scene: &Scene) -> Result<Solved, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
-        self.store.remember(STEEL, &self.field, || {
-            steel::solve(scene, scene.tolerances.map, lowest_m)
-        })
+        if let Some(solved) = self.store.recall(STEEL, &self.field) {
+            return Ok(solved);
+        }
+        let solved = steel::solve_with(scene, scene.tolerances.map, lowest_m, self)?;
+        self.store.keep(STEEL, &self.field, &solved);
+        if self.holds_steel() {
+            // It holds all of its blocks.
+            self.store.forget(CHOICE);
+            (1..)
+                .map(block)
+                .take_while(|name| self.store.forget(name))
+                .for_each(drop);
+        }
+        Ok(solved)
+    }
+
+    /// Solves a part of the drives of the coupled cores of `scene`, which `part` chooses by the number of
+    /// their blocks, for [`FieldStore::steel`] to find.
+    ///
+    /// # Errors
+    /// As [`steel::solve`]; a design whose drives are not solved in blocks; a cache that cannot be written.
+    pub fn steel_part(
+        &self,
+        scene: &Scene,
+        part: impl FnOnce(u64) -> Result<Range<u64>, String>,
+    ) -> Result<SteelPart, RunError> {
+        let lowest_m = scene.design.workspace.z_m.from;
+        let Some(request) = steel::in_blocks(scene, scene.tolerances.map, lowest_m)? else {
+            return Err(RunError::Input(format!(
+                "--shard splits the drives of more than {MOST_WHOLE} cored coils that are coupled, and this \
+                 design has no such: leave --shard out, one run solves its steel"
+            )));
+        };
+        let blocks = request.blocks();
+        let numbers = part(blocks as u64).map_err(RunError::Input)?;
+        let numbers = numbers.start as usize..numbers.end as usize;
+        let of = numbers.len();
+        if self.holds_steel() {
+            let solved = 0;
+            return Ok(SteelPart { blocks, of, solved });
+        }
+        let solved = request.solve_blocks(numbers.clone(), self)?;
+        let held = |number: usize| match number {
+            0 => self.store.holds(CHOICE, &self.field),
+            number => self.store.holds(&block(number), &self.field),
+        };
+        if numbers.into_iter().all(held) {
+            return Ok(SteelPart { blocks, of, solved });
+        }
+        Err(RunError::Input(format!(
+            "what was solved cannot be kept in {STORE_FOLDER} beside the design's bundles, where other runs look for \
+             it: make the folder writable, or give another --out"
+        )))
     }
 
     /// The part that one shape needs.

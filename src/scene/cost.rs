@@ -5,6 +5,7 @@
 
 use super::Scene;
 use super::coupled;
+use super::sources::ShapeSource;
 use super::tolerances::Tolerances;
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
@@ -65,6 +66,46 @@ const WORST_POINT: Law = Law {
     seconds: |points, coils| 8e-8 * points * coils + 4e-8 * coils.powi(3),
     reduce: FEWER,
 };
+/// Of one component in air, by `--law map-table:nodes --law map-table:coils`.
+const MAP: Law = Law {
+    stage: "the map",
+    seconds: |nodes, coils| 1.2e-8 * nodes * coils,
+    reduce: FEWER_NODES,
+};
+/// Of several, which come from tensors.
+const MAP_OF_TENSORS: Law = Law {
+    seconds: |nodes, coils| 4e-7 * nodes * coils,
+    ..MAP
+};
+/// The same of coupled steel, which is tabulated first.
+const MAP_OF_STEEL: Law = Law {
+    seconds: |nodes, coils| 5e-8 * nodes * coils,
+    ..MAP
+};
+const MAP_OF_STEEL_TENSORS: Law = Law {
+    seconds: |nodes, coils| 5.5e-7 * nodes * coils,
+    ..MAP
+};
+const FEWER_NODES: &str = "ask for fewer samples under [workspace], or for fewer components";
+/// Of designs, evaluated (`time fluxform sweep run`), one coil searched in each.
+const EVALUATED: Law = Law {
+    stage: "the coils",
+    seconds: |designs, _| 8e-4 * designs,
+    reduce: FEWER_DESIGNS,
+};
+const EVALUATED_CORES: Law = Law {
+    seconds: |designs, _| 0.04 * designs,
+    ..EVALUATED
+};
+const SEARCHED: Law = Law {
+    seconds: |designs, _| 0.02 * designs,
+    ..EVALUATED
+};
+const SEARCHED_CORES: Law = Law {
+    seconds: |designs, _| 0.8 * designs,
+    ..EVALUATED
+};
+const FEWER_DESIGNS: &str = "plan fewer designs, or share them among machines with --shard";
 /// Of the force of a coil at a point through coupled steel, s.
 pub const STEEL_POINT_COIL_S: f64 = 1.5e-6;
 
@@ -109,11 +150,18 @@ pub fn of_map(design: &Design, components: Components) -> Cost {
     let samples = [workspace.x_m, workspace.y_m, workspace.z_m].map(|axis| axis.samples);
     let [x, y, z] = samples;
     let coils = design.array.positions_m.len();
+    let steel = coupled(design) || design.has_iron();
+    let law = match (steel, components) {
+        (false, Components::Gz) => MAP,
+        (false, _) => MAP_OF_TENSORS,
+        (true, Components::Gz) => MAP_OF_STEEL,
+        (true, _) => MAP_OF_STEEL_TENSORS,
+    };
     Cost {
         what: format!("the map of {x} x {y} x {z} nodes and {coils} coils"),
         bytes: MAP_VALUE_BYTES * parts * coils as f64 * product(&samples),
-        cpu_seconds: 0.0,
-        reduce: "ask for fewer samples under [workspace], or for fewer components",
+        cpu_seconds: (law.seconds)(product(&samples), coils as f64),
+        reduce: law.reduce,
         misses: None,
     }
 }
@@ -167,6 +215,46 @@ pub fn of_force_constants(
     [forces, PATH, WORST_POINT]
         .map(|law| law.cost(points, positions_m.len() as f64))
         .into()
+}
+
+/// What is computed of every design of a sweep.
+#[derive(Debug, Clone, Copy)]
+pub enum OfDesigns<'a> {
+    /// The coil as given.
+    Evaluated,
+    /// The best coil.
+    Searched,
+    /// The best array for these shapes, after at most so many.
+    ArraysFor(&'a [ShapeSource], usize),
+}
+
+/// The time that `designs` designs like `design` take.
+#[must_use]
+pub fn of_designs(design: &Design, what: OfDesigns, designs: u64, tolerance: Option<f64>) -> Cost {
+    let count = designs as f64;
+    let law = match (what, design.core.is_some() || design.has_iron()) {
+        (OfDesigns::Evaluated, false) => EVALUATED,
+        (OfDesigns::Evaluated, true) => EVALUATED_CORES,
+        (OfDesigns::Searched, false) => SEARCHED,
+        (OfDesigns::Searched | OfDesigns::ArraysFor(..), _) => SEARCHED_CORES,
+    };
+    let cpu_seconds = match what {
+        OfDesigns::Evaluated | OfDesigns::Searched => (law.seconds)(count, 1.0),
+        OfDesigns::ArraysFor(shapes, evaluations) => {
+            let constants = shapes
+                .iter()
+                .flat_map(|shape| of_force_constants(design, &shape.document, tolerance));
+            let each = constants.chain(of_steel(design, tolerance));
+            count * evaluations as f64 * each.map(|cost| cost.cpu_seconds).sum::<f64>()
+        }
+    };
+    Cost {
+        what: format!("{designs} designs of the sweep"),
+        bytes: 0.0,
+        cpu_seconds,
+        reduce: law.reduce,
+        misses: None,
+    }
 }
 
 /// Whether the coils of `design` are so far from each other's points that forces are computed the sure way.
@@ -266,13 +354,20 @@ mod tests {
     #[test]
     fn laws_are_those_of_the_recorded_measurements() {
         const POINTS: f64 = 3721.0;
+        const NODES: f64 = 61.0 * 61.0 * 29.0;
         for (law, stage, coils) in [
             (FORCES, "forces", 9.0),
+            (MAP, "map-table", 9.0),
             (FORCES_OF_STEEL, "forces, coupled", 9.0),
             (PATH, "lambda-path", 9.0),
             (WORST_POINT, "worst-point, 25 overlapping coils", 25.0),
         ] {
-            let (points, seconds) = largest(stage, "points");
+            let axis = if stage == "map-table" {
+                "nodes"
+            } else {
+                "points"
+            };
+            let (points, seconds) = largest(stage, axis);
             let share = (law.seconds)(points, coils) / seconds;
             assert!((0.33..3.0).contains(&share), "{stage}: {share}");
         }
@@ -280,9 +375,11 @@ mod tests {
             (FORCES_FROM_FAR, "forces"),
             (PATH, "lambda-path"),
             (WORST_POINT, "worst-point"),
+            (MAP, "map-table"),
         ] {
             let (coils, seconds) = largest(stage, "coils");
-            let share = (law.seconds)(POINTS, coils) / seconds;
+            let count = if stage == "map-table" { NODES } else { POINTS };
+            let share = (law.seconds)(count, coils) / seconds;
             assert!((0.33..3.0).contains(&share), "{stage}: {share}");
         }
     }

@@ -12,8 +12,10 @@ use crate::RunError;
 use crate::field::iron::array::{IronArray, IronPeaks};
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
+use crate::field::steel::array_request::{ArrayRequest, DriveCache, NoCache};
 use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
 use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::field::winding::KERNEL_ERROR;
 
 /// Most points at which solutions of steel of any shape are compared.
@@ -313,26 +315,27 @@ pub(crate) fn clearance_of_m(
 /// # Errors
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
 pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, RunError> {
+    solve_with(scene, tolerance, lowest_m, &NoCache)
+}
+
+/// As [`solve`]; the drives of many coupled cores that `cache` holds are taken from there.
+///
+/// # Errors
+/// As [`solve`].
+pub(super) fn solve_with(
+    scene: &Scene,
+    tolerance: f64,
+    lowest_m: f64,
+    cache: &dyn DriveCache,
+) -> Result<Solved, RunError> {
     if let Some(iron) = &scene.iron {
         return solve_iron(scene, iron, tolerance, lowest_m);
     }
     let Some(core) = &scene.core else {
         return Ok(Solved::in_air(tolerance));
     };
-    let current_a = scene.rated_current_a();
-    let at_current = match &core.material {
-        Material::Curve(curve) if current_a > 0.0 => {
-            let aim = STEEL_SHARE * tolerance;
-            let state = at_current::solve(scene, core, curve, current_a, aim, lowest_m)?;
-            let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
-            Some((state, secant))
-        }
-        Material::Curve(_) | Material::Linear(_) => None,
-    };
-    let relative_permeability = match &at_current {
-        Some((_, secant)) => *secant,
-        None => core.relative_permeability(),
-    };
+    let at_current = state_at_current(scene, core, tolerance, lowest_m)?;
+    let relative_permeability = permeability(core, at_current.as_ref());
     let solved = |steel, steel_error| Solved {
         steel,
         tolerance,
@@ -341,27 +344,13 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         prepared: PreparedField::default(),
     };
     if coupled(scene.design) {
-        let radii = core.shape.length_m() / core.shape.radius_m;
-        if radii > MOST_SLENDER {
-            return Err(RunError::Input(format!(
-                "[core] cores {radii:.0} radii long are not solved together with their neighbours: it \
-                 would take minutes and miss every tolerance beyond {MOST_SLENDER} radii; shorten the \
-                 core, or give [array] coupling = \"none\""
-            )));
-        }
-        let array = CoupledArray::new(
-            &scene.winding,
-            core.shape,
-            relative_permeability,
-            &scene.design.array.positions_m,
-            STEEL_SHARE * tolerance,
-            lowest_m,
-        )?;
+        let array =
+            request(scene, core, relative_permeability, tolerance, lowest_m)?.solve(cache)?;
         let steel_error = array.relative_error;
         return Ok(solved(Steel::Coupled(Box::new(array)), steel_error));
     }
     let (alone, steel_error) = match at_current {
-        Some((state, _)) => (
+        Some(state) => (
             AloneCore {
                 layer: state.layer,
                 added_inductance_h: state.added_inductance_h,
@@ -388,6 +377,84 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         }
     };
     Ok(solved(Steel::Alone(Box::new(alone)), steel_error))
+}
+
+/// The state of one core along its B-H curve at the rated current; `None` where it has none.
+///
+/// # Errors
+/// A curve along which no state is found.
+fn state_at_current(
+    scene: &Scene,
+    core: &SceneCore,
+    tolerance: f64,
+    lowest_m: f64,
+) -> Result<Option<SaturatedCoil>, RunError> {
+    let current_a = scene.rated_current_a();
+    match &core.material {
+        Material::Curve(curve) if current_a > 0.0 => {
+            let aim = STEEL_SHARE * tolerance;
+            at_current::solve(scene, core, curve, current_a, aim, lowest_m).map(Some)
+        }
+        Material::Curve(_) | Material::Linear(_) => Ok(None),
+    }
+}
+
+/// The permeability of the linear solution beside a state along the curve.
+fn permeability(core: &SceneCore, at_current: Option<&SaturatedCoil>) -> f64 {
+    match (&core.material, at_current) {
+        (Material::Curve(curve), Some(state)) => {
+            curve.relative_permeability(state.inside.mean_b_t).max(1.0)
+        }
+        (Material::Curve(_) | Material::Linear(_), _) => core.relative_permeability(),
+    }
+}
+
+/// The coupled cores of `scene` as they are solved.
+///
+/// # Errors
+/// Cores too slender for that.
+fn request<'a>(
+    scene: &'a Scene,
+    core: &SceneCore,
+    relative_permeability: f64,
+    tolerance: f64,
+    lowest_m: f64,
+) -> Result<ArrayRequest<'a>, RunError> {
+    let radii = core.shape.length_m() / core.shape.radius_m;
+    if radii > MOST_SLENDER {
+        return Err(RunError::Input(format!(
+            "[core] cores {radii:.0} radii long are not solved together with their neighbours: it \
+             would take minutes and miss every tolerance beyond {MOST_SLENDER} radii; shorten the \
+             core, or give [array] coupling = \"none\""
+        )));
+    }
+    Ok(ArrayRequest {
+        winding: &scene.winding,
+        shape: core.shape,
+        relative_permeability,
+        positions_m: &scene.design.array.positions_m,
+        tolerance: STEEL_SHARE * tolerance,
+        lowest_m,
+    })
+}
+
+/// The coupled cores of `scene` as [`solve_with`] solves them, in blocks of drives; `None` where it does
+/// not solve it in blocks.
+///
+/// # Errors
+/// As [`solve`].
+pub(super) fn in_blocks<'a>(
+    scene: &'a Scene,
+    tolerance: f64,
+    lowest_m: f64,
+) -> Result<Option<ArrayRequest<'a>>, RunError> {
+    let Some(core) = scene.core.as_ref().filter(|_| coupled(scene.design)) else {
+        return Ok(None);
+    };
+    let at_current = state_at_current(scene, core, tolerance, lowest_m)?;
+    let relative_permeability = permeability(core, at_current.as_ref());
+    let request = request(scene, core, relative_permeability, tolerance, lowest_m)?;
+    Ok(Some(request).filter(|request| request.blocks() > 0))
 }
 
 fn solve_iron(

@@ -16,7 +16,9 @@ use fluxform_testing::run::program_or_other;
 use fluxform_testing::surface_files;
 
 /// When the signals are sent, s.
-const AFTER_S: [f64; 8] = [0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0, 8.0];
+const AFTER_S: [f64; 12] = [
+    0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0, 8.0, 13.0, 20.0, 30.0, 45.0,
+];
 /// An answer that takes longer is not waited for, s.
 const MOST_S: f64 = 10.0;
 

@@ -20,6 +20,7 @@ mod optimize_array;
 mod placement;
 mod scan;
 mod screen;
+mod shards;
 mod steel;
 mod streams;
 mod surfaces;

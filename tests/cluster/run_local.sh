@@ -164,8 +164,47 @@ with_slurm() {
     sbatch --parsable --array=1-7 "$script" plan.json by_slurm >/dev/null
     drained
     compare by_slurm
+    array_with_slurm
     say "slurm $(slurmctld -V | cut -d' ' -f2): cancelled at $before of $points points, submitted again, the same bytes"
 }
 
+# An array of 5 x 9 coupled cored coils, whose drives make two blocks.
+write_array() {
+    sed 's/rows = 3/rows = 5/; s/columns = 3/columns = 9/; s/, 61]/, 9]/; s/, 29]/, 5]/' \
+        "$root/designs/seed.toml" >wide.toml
+    printf 'name = "flat"\nprimitive = "flat"\n[points]\nx_mm = [-50.0, 50.0, 9]\ny_mm = [-50.0, 50.0, 9]\n' >flat.toml
+    "$fluxform" -q calibrate wide.toml flat.toml --tolerance 1e-2 --threads 1 --out array_whole
+}
+
+# Calibrates in folder $1, whose blocks are there, and compares the bundles.
+compare_array() {
+    local file
+    "$fluxform" -q calibrate wide.toml flat.toml --tolerance 1e-2 --threads 1 --out "$1"
+    for file in manifest.json map.npz lambda.json points.csv currents.csv; do
+        cmp "array_whole/seed/flat/$file" "$1/seed/flat/$file"
+    done
+}
+
+array_with_parallel() {
+    command -v parallel >/dev/null || return 0
+    local run=("$fluxform" -q calibrate wide.toml flat.toml --tolerance 1e-2 --threads 1 --out array_parallel)
+    "${run[@]}" --shard 1/2
+    parallel -j 2 "${run[@]}" --shard {}/2 ::: 1 2
+    compare_array array_parallel
+    say "parallel: the drives of an array in two parts, the same bytes"
+}
+
+array_with_slurm() {
+    local script=$root/scripts/calibrate_slurm.sh first
+    local of=(2 wide.toml flat.toml --tolerance 1e-2 --out array_slurm)
+    first=$(sbatch --parsable --array=1 "$script" "${of[@]}")
+    sbatch --parsable --array=2 --dependency=afterok:"$first" "$script" "${of[@]}" >/dev/null
+    drained
+    compare_array array_slurm
+    say "slurm: the drives of an array in two parts, the same bytes"
+}
+
+write_array
 [ "$only" = slurm ] || with_parallel
+[ "$only" = slurm ] || array_with_parallel
 [ "$only" = parallel ] || with_slurm

@@ -1,12 +1,15 @@
 //! Designs with steel through the jobs: the numbers measured with two independent methods, and
 //! bundles of every kind of design verified.
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use fluxform::commands::evaluate::{Evaluation, evaluate};
+use fluxform::commands::verify::{Verifier, VerifyOptions};
 use fluxform::commands::{lambda, verify};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
+use fluxform::scene::cost::Cost;
 use fluxform::shape::document::ShapeDocument;
 
 use crate::{calibrate_text, here};
@@ -256,6 +259,42 @@ fn bundles_with_and_without_coupling_are_verified() {
     let none = ("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
     calibrated_and_verified("full", &[]);
     calibrated_and_verified("none", &[none]);
+}
+
+/// Minutes of a large array passed without a word.
+#[test]
+fn verify_states_all_that_it_takes_before_it_solves() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let folder = calibrated(&[PAIR], out.path());
+    let stated = RefCell::new(Vec::new());
+    let limit = |costs: &[Cost]| {
+        stated.borrow_mut().extend_from_slice(costs);
+        Err("that is enough".to_owned())
+    };
+    let refused = Verifier::limited(&limit).verify(&folder, VerifyOptions::default(), &Silent);
+    let message = refused.expect_err("refused").to_string();
+    assert!(message.contains("that is enough"), "{message}");
+    let stated = stated.into_inner();
+    let of = |stage: &str| {
+        stated
+            .iter()
+            .filter(|cost| cost.what.contains(stage))
+            .count()
+    };
+    // As the bundle was made, and by the independent route.
+    for stage in [
+        "the steel",
+        "the forces",
+        "lambda's path",
+        "the worst point",
+    ] {
+        assert_eq!(of(stage), 2, "{stage}: {stated:?}");
+    }
+    assert_eq!(of("the map"), 1);
+    assert!(
+        stated.iter().all(|cost| cost.cpu_seconds > 0.0),
+        "{stated:?}"
+    );
 }
 
 #[test]

@@ -14,7 +14,7 @@ use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [the_first_command_prints_what_the_readme_shows, the_picture_is_what_its_command_draws, the_table_of_numbers_is_what_the_commands_print, one_command_of_a_section_prints_what_is_shown, the_errors_of_a_scene_are_those_shown, the_sweep_prints_what_is_shown, the_replay_prints_what_is_shown, the_tray_shields_as_shown, every_command_has_a_row_and_every_row_is_a_command],
+        None => [the_first_command_prints_what_the_readme_shows, the_picture_is_what_its_command_draws, the_table_of_numbers_is_what_the_commands_print, one_command_of_a_section_prints_what_is_shown, the_errors_of_a_scene_are_those_shown, the_sweep_prints_what_is_shown, the_parts_of_an_array_print_what_is_shown, the_replay_prints_what_is_shown, the_tray_shields_as_shown, every_command_has_a_row_and_every_row_is_a_command],
         needs::python() => [the_table_of_force_constants_is_what_its_script_prints],
     }
 }
@@ -160,6 +160,16 @@ fn the_sweep_prints_what_is_shown() {
         .map(|command| printed(&arguments(command, &files, folder.path())))
         .collect();
     assert_eq!(lasting(&shown), lasting(&all));
+}
+
+fn the_parts_of_an_array_print_what_is_shown() {
+    let (commands, shown) = command_and_output("Share one array among machines");
+    let place = Place::new();
+    let printed: String = commands
+        .lines()
+        .map(|command| place.shell(command).ends(0).out)
+        .collect();
+    assert_eq!(lasting(&shown), lasting(&printed));
 }
 
 /// |B| with and without the tray of the text, every coil at 1 A.

@@ -58,7 +58,8 @@ pub struct Arguments {
     /// Measure time and memory against numbers of coils, points, triangles, nodes and threads
     #[arg(long)]
     scaling: bool,
-    /// Of --scaling measure this law alone; may be repeated. The others stay as the folder has them
+    /// Of --scaling measure this law alone; may be repeated. The others, and stages that are not named,
+    /// stay as the folder has them
     #[arg(long, value_name = "STAGE:AXIS", requires = "scaling", value_parser = law_name)]
     law: Vec<String>,
     /// Run the stability catalogue; with --quick the part of it that every change runs

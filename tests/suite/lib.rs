@@ -45,7 +45,8 @@ pub struct BenchRequest {
     pub peers: bool,
     /// Whether time and memory are measured against size.
     pub scaling: bool,
-    /// Which of those laws, by [`scaling::Spec::name`]; none: all. The others stay as the folder has them.
+    /// Which of those laws, by [`scaling::Spec::name`]; none: all. The others, and stages that are not named, stay
+    /// as the folder has them.
     pub laws: Vec<String>,
     /// Folder of the files.
     pub out: PathBuf,
@@ -53,16 +54,17 @@ pub struct BenchRequest {
     pub force: bool,
 }
 
-/// The stages that are measured.
+/// The stages that are measured: those named, or all unless chosen laws are measured again.
 fn chosen(request: &BenchRequest) -> impl Iterator<Item = &'static Stage> {
-    STAGES.iter().filter(|stage| {
-        request.stages.is_empty() || request.stages.iter().any(|expected| expected == stage.name)
-    })
+    let all = request.stages.is_empty() && request.laws.is_empty();
+    STAGES
+        .iter()
+        .filter(move |stage| all || request.stages.iter().any(|named| named == stage.name))
 }
 
-/// Their inputs, each once.
-fn inputs(request: &BenchRequest) -> Vec<Input> {
-    let mut all: Vec<Input> = Vec::new();
+/// The inputs of an `earlier` run whose rows stay and of the stages that are measured, each once.
+fn inputs(request: &BenchRequest, earlier: Option<&BenchFile>) -> Vec<Input> {
+    let mut all = earlier.map_or(Vec::new(), |file| file.inputs.clone());
     for input in chosen(request).flat_map(Stage::inputs) {
         if !all.contains(&input) {
             all.push(input);
@@ -76,7 +78,9 @@ fn inputs(request: &BenchRequest) -> Vec<Input> {
 /// # Errors
 /// Files that must not be replaced; a stage that fails; interruption.
 pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, RunError> {
-    let of = (&*inputs(request), &output::made_with(request));
+    let earlier = output::earlier(request)?;
+    let made_with = output::made_with(request, earlier.as_ref());
+    let of = (&*inputs(request, earlier.as_ref()), &made_with);
     output::check(of, &request.out, request.force)?;
     let mut file = measure(request, progress)?;
     output::write(&mut file, &request.out, request.force)?;
@@ -88,6 +92,7 @@ pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile,
 /// # Errors
 /// As [`run`].
 pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, RunError> {
+    let earlier = output::earlier(request)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -104,21 +109,29 @@ pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchF
         Vec::new()
     };
     let scaling = if request.scaling {
-        scaling::laws(request, output::earlier_laws(request)?, progress)?
+        let known = earlier.as_ref().map_or(&[][..], |file| &file.scaling);
+        scaling::laws(request, known, progress)?
     } else {
         Vec::new()
     };
-    let mut accuracy = BTreeMap::new();
-    let mut stages = Vec::new();
+    let inputs = inputs(request, earlier.as_ref());
+    let made_with = output::made_with(request, earlier.as_ref());
+    // Rows that are not measured again stay.
+    let (mut stages, mut accuracy) = earlier.map_or_else(
+        || (Vec::new(), BTreeMap::new()),
+        |file| (file.stages, file.accuracy),
+    );
     for stage in measured {
         accuracy.insert(stage.curves.stage.clone(), stage.accuracy);
+        stages.retain(|known| known.stage != stage.curves.stage);
         stages.push(stage.curves);
     }
+    stages.sort_by_key(|stage| STAGES.iter().position(|known| known.name == stage.stage));
     Ok(BenchFile {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
-        inputs: inputs(request),
-        made_with: output::made_with(request),
+        inputs,
+        made_with,
         units: UNITS.to_owned(),
         quick: request.pace.quick,
         stages,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::BenchRequest;
 use crate::catalogue::{CaseRow, CatalogueFile, write_cases};
-use crate::file::{BenchFile, Law, write_laws, write_rows};
+use crate::file::{BenchFile, write_laws, write_rows};
 use fluxform::RunError;
 use fluxform::bundle::artefact::{
     FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, UNITS,
@@ -25,9 +25,17 @@ pub const JSON: &str = "bench.json";
 /// A larger one is none of ours.
 const JSON_MAX_BYTES: u64 = 64 << 20;
 
-/// The options of a run as its record states them.
+/// The options of a run as its record states them, or those of an `earlier` one some of whose rows are
+/// measured again.
 #[must_use]
-pub fn made_with(request: &BenchRequest) -> Options {
+pub fn made_with(request: &BenchRequest, earlier: Option<&BenchFile>) -> Options {
+    let again = earlier.filter(|file| {
+        let known = |name: &String| file.stages.iter().any(|stage| stage.stage == *name);
+        file.quick == request.pace.quick && request.stages.iter().all(known)
+    });
+    if let Some(file) = again {
+        return file.made_with.clone();
+    }
     #[derive(Serialize)]
     struct Asked<'a> {
         quick: bool,
@@ -82,20 +90,19 @@ pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(),
     Ok(overwrite(of, folder, JSON, force).check(&folder.join(JSON))?)
 }
 
-/// The laws of an earlier run in the folder, where not all are measured again.
+/// An earlier run in the folder, where not all laws are measured again.
 ///
 /// # Errors
 /// A file of something else.
-pub fn earlier_laws(request: &BenchRequest) -> Result<Vec<Law>, RunError> {
+pub fn earlier(request: &BenchRequest) -> Result<Option<BenchFile>, RunError> {
     let path = request.out.join(JSON);
     if request.laws.is_empty() || !path.exists() {
-        return Ok(Vec::new());
+        return Ok(None);
     }
     let refused =
         |fault: &dyn std::fmt::Display| RunError::Input(format!("{}: {fault}", path.display()));
     let bytes = read_plain(&path, JSON_MAX_BYTES).map_err(|fault| refused(&fault))?;
-    let file: BenchFile = serde_json::from_slice(&bytes).map_err(|fault| refused(&fault))?;
-    Ok(file.scaling)
+    serde_json::from_slice(&bytes).map_err(|fault| refused(&fault))
 }
 
 /// Writes all files; `files` lists them but for the JSON itself.

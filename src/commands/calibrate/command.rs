@@ -1,18 +1,19 @@
 //! `calibrate`: maps, points, force constant and currents of objects, one bundle each.
 
 use clap::Args;
+use serde::Serialize;
 
 use super::BundleReport;
 use super::CalibrateOptions;
 use super::CalibrateReport;
 use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
-use super::run;
 use super::text::summary;
+use super::{run, run_shard};
 use crate::cli::args::{
     ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag, Writing,
 };
-use crate::cli::budget::{allow, cost_origin, costs};
+use crate::cli::budget::{CostOrigin, allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -25,8 +26,10 @@ use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
+use crate::commands::sweep::run::Part;
 use crate::design::Need;
-use crate::scene::cost::{Components, of_map};
+use crate::scene::cached_field::SteelPart;
+use crate::scene::cost::{Components, of_map, of_steel};
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::ErrorTarget;
 
@@ -69,6 +72,20 @@ pub struct Calibrate {
     /// OUT/<design>/.fluxform-cache
     #[arg(long, hide_short_help = true)]
     no_cache: bool,
+    /// Solve only part I of N of the coils' drives, into the cache, counted from 1
+    ///
+    /// Of more than 16 coupled cored coils: the drives are solved in blocks, which any number of runs on one
+    /// machine or many that share OUT may solve before one without --shard. That one then writes the
+    /// same bytes as alone; blocks that are missing, damaged or of another build it solves itself. Part
+    /// 1 decides how finely all are solved: start it first.
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "I/N",
+        value_parser = Part::shard,
+        conflicts_with_all = ["no_cache", "explain"]
+    )]
+    shard: Option<Part>,
     /// Report the plan and its cost first
     ///
     /// With the reason for every part that is left out, and the error that this costs.
@@ -138,6 +155,9 @@ impl Calibrate {
             page: !self.no_report,
             vtk: self.vtk,
         };
+        if let Some(shard) = self.shard {
+            return solve_shard(source, shard, &options, printer);
+        }
         let bar = begin(printer);
         let plan = self
             .explain
@@ -183,6 +203,44 @@ impl Calibrate {
             .collect();
         rendered(&constants)
     }
+}
+
+#[derive(Serialize)]
+struct ShardSummary<'a> {
+    design: &'a str,
+    #[serde(flatten)]
+    part: SteelPart,
+}
+
+/// One part of the drives, and what was done.
+fn solve_shard(
+    source: DesignSource,
+    shard: Part,
+    options: &CalibrateOptions,
+    printer: &Printer,
+) -> Result<(), Failure> {
+    let design = source.design;
+    let steel = of_steel(design, options.lambda.tolerance_for(design));
+    allow(steel, CostOrigin::Document, printer)?;
+    let bar = begin(printer);
+    let part = run_shard(source, shard, options, &bar)?;
+    drop(bar);
+    let summary = ShardSummary {
+        design: &design.name,
+        part,
+    };
+    let json = printer.with_warnings(&summary);
+    let text = || {
+        let blocks = count(part.of, "block");
+        let mut sheet = Sheet::new(&format!(
+            "{}: {blocks} of {} of drives",
+            design.name, part.blocks
+        ));
+        let before = part.of - part.solved;
+        sheet.line("solved", &format!("{} now, {before} before", part.solved));
+        sheet.finish()
+    };
+    printer.summary(Stream::Output, &json, text)
 }
 
 fn explained(plan: &Plan) -> String {

@@ -12,6 +12,7 @@ use super::lambda::placement::Placed;
 use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
+use super::sweep::run::Part;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
@@ -35,7 +36,7 @@ use crate::map::tabulate::Grid;
 use crate::progress::Progress;
 use crate::report::bundle_files;
 use crate::scene::Scene;
-use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
+use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField, SteelPart};
 use crate::scene::named_files::NamedContent;
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
@@ -282,6 +283,25 @@ pub fn run(
         plan: None,
         bundles,
     })
+}
+
+/// Solves the part that `shard` chooses of the drives of the coupled cores of `source` into its cache, where
+/// [`run`] with the same options finds it, and writes nothing else.
+///
+/// # Errors
+/// As [`FieldStore::steel_part`]; interruption.
+pub fn run_shard(
+    source: DesignSource,
+    shard: Part,
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<SteelPart, RunError> {
+    let tolerance = options.lambda.tolerance_for(source.design);
+    let scene = Scene::with_tolerance(source.design, tolerance)?;
+    progress.begin("steel", 1);
+    let part = field_store(&scene, options).steel_part(&scene, |blocks| shard.indices(blocks))?;
+    progress.end();
+    Ok(part)
 }
 
 /// # Errors

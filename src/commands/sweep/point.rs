@@ -18,6 +18,7 @@ use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Silent, poll};
 use crate::scene::Scene;
+use crate::scene::cost::{Cost, OfDesigns, of_designs};
 use crate::scene::rated::{CircuitSummary, Rated};
 use crate::scene::sources::ShapeSource;
 
@@ -46,6 +47,42 @@ impl<'a> Sweep<'a> {
         })
     }
 
+    /// The time that points like this one take, `points` of them; `None` where its design cannot be read.
+    pub(super) fn cost(&self, index: u64, points: u64) -> Option<Cost> {
+        let (design, _) = self.design(index).ok()?;
+        let what = match self.plan.mode {
+            Mode::Evaluate => OfDesigns::Evaluated,
+            Mode::Optimize | Mode::OptimizeWound => OfDesigns::Searched,
+            Mode::OptimizeFor => OfDesigns::ArraysFor(&self.shapes, self.evaluations()),
+        };
+        Some(of_designs(&design, what, points, self.plan.tolerance))
+    }
+
+    /// Arrays that the search of a point computes at most.
+    fn evaluations(&self) -> usize {
+        let task = self.plan.array.as_ref();
+        task.map_or(Settings::default().evaluations, |task| task.evaluations)
+    }
+
+    /// The design of point `index` and its text.
+    fn design(&self, index: u64) -> Result<(Design, String), String> {
+        let values = self.plan.values_at(index);
+        let settings = self
+            .plan
+            .axes
+            .iter()
+            .zip(values)
+            .map(|(axis, value)| (axis.key.as_str(), toml_value(value)));
+        let text = self.template.with(settings)?;
+        let need = match self.plan.mode {
+            Mode::Evaluate => Need::EVALUATE,
+            Mode::Optimize | Mode::OptimizeWound => Need::OPTIMIZE,
+            Mode::OptimizeFor => Need::CALIBRATE,
+        };
+        let (design, _) = Design::from_toml(&text, self.path, need).map_err(|e| refusal(&e))?;
+        Ok((design, text))
+    }
+
     /// Point `index`; a design that cannot be computed is a point that failed.
     pub(super) fn point(&self, index: u64) -> PointFile {
         let sha256 = &self.plan.plan_sha256;
@@ -62,20 +99,7 @@ impl<'a> Sweep<'a> {
     }
 
     fn outcome(&self, index: u64) -> Result<Computed, String> {
-        let values = self.plan.values_at(index);
-        let settings = self
-            .plan
-            .axes
-            .iter()
-            .zip(values)
-            .map(|(axis, value)| (axis.key.as_str(), toml_value(value)));
-        let text = self.template.with(settings)?;
-        let need = match self.plan.mode {
-            Mode::Evaluate => Need::EVALUATE,
-            Mode::Optimize | Mode::OptimizeWound => Need::OPTIMIZE,
-            Mode::OptimizeFor => Need::CALIBRATE,
-        };
-        let (design, _) = Design::from_toml(&text, self.path, need).map_err(|e| refusal(&e))?;
+        let (design, text) = self.design(index)?;
         let computed = match self.plan.mode {
             Mode::Evaluate => evaluated(&design, self.plan.tolerance),
             Mode::Optimize | Mode::OptimizeWound => {
@@ -112,11 +136,7 @@ impl Sweep<'_> {
         let default = Settings::default();
         let settings = Settings {
             seed: self.plan.seed_at(index),
-            evaluations: self
-                .plan
-                .array
-                .as_ref()
-                .map_or(default.evaluations, |task| task.evaluations),
+            evaluations: self.evaluations(),
             ..default
         };
         let request = ArrayRequest {

@@ -14,6 +14,7 @@ use crate::bundle::atomic::WriteError;
 use crate::bundle::read_bounded::digest_plain;
 use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
 use crate::progress::Progress;
+use crate::scene::cost::Cost;
 use crate::scene::sources::ShapeSource;
 
 /// The largest file that a plan names, bytes.
@@ -36,6 +37,21 @@ pub enum Part {
 }
 
 impl Part {
+    /// Part I of N, given as I/N.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn shard(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(number, of)| {
+            let (number, of) = (number.parse::<u64>().ok()?, of.parse::<u64>().ok()?);
+            (1..=of).contains(&number).then_some((number, of))
+        });
+        match numbers {
+            Some((number, of)) => Ok(Self::Shard { number, of }),
+            None => Err("expected I/N, I from 1 to N, like 1/3".to_owned()),
+        }
+    }
+
     /// Indices of the part's points among `points`. Blocks are contiguous, so that shards rarely
     /// share a folder.
     ///
@@ -71,6 +87,17 @@ pub struct RunReport {
     pub inaccurate: u64,
     /// The first that failed, and why.
     pub first_failure: Option<(u64, String)>,
+}
+
+/// The time that the points `indices` of `plan` take, like the middle one of them.
+///
+/// # Errors
+/// Documents that cannot be read.
+pub fn cost(plan: &PlanFile, indices: &Range<u64>) -> Result<Option<Cost>, RunError> {
+    let shapes = plan.array.as_ref().map_or(Ok(Vec::new()), shapes)?;
+    let points = indices.end - indices.start;
+    let middle = indices.start + points / 2;
+    Ok(Sweep::new(plan, shapes)?.cost(middle, points))
 }
 
 /// Computes the points `indices` of `plan` into `folder`, in parallel, each into its own file.
@@ -190,6 +217,15 @@ fn check_inputs(plan: &PlanFile, shapes: &[ShapeSource]) -> Result<(), RunError>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shards_are_counted_from_one() {
+        assert_eq!(Part::shard("1/3"), Ok(Part::Shard { number: 1, of: 3 }));
+        assert_eq!(Part::shard("3/3"), Ok(Part::Shard { number: 3, of: 3 }));
+        for bad in ["0/3", "4/3", "1", "1/0", "a/b", "1/3/5", "-1/3"] {
+            assert!(Part::shard(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn shards_are_disjoint_and_complete() {

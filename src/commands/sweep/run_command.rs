@@ -3,7 +3,8 @@
 use clap::Args;
 use serde::Serialize;
 
-use super::run::{Part, RunReport, run};
+use super::run::{Part, RunReport, cost, run};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -36,7 +37,7 @@ pub struct Run {
     #[arg(long, value_name = "DIR")]
     out: FileArgument,
     /// Only part I of N, counted from 1
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N", value_parser = Part::shard)]
     shard: Option<Part>,
     /// Only the point with this index, counted from 0
     #[arg(long, value_name = "K", conflicts_with = "shard")]
@@ -62,17 +63,6 @@ struct RunSummary<'a> {
     accuracy_not_reached: u64,
 }
 
-fn shard(text: &str) -> Result<Part, String> {
-    let numbers = text.split_once('/').and_then(|(number, of)| {
-        let (number, of) = (number.parse::<u64>().ok()?, of.parse::<u64>().ok()?);
-        (1..=of).contains(&number).then_some((number, of))
-    });
-    match numbers {
-        Some((number, of)) => Ok(Part::Shard { number, of }),
-        None => Err("expected I/N, I from 1 to N, like 1/3".to_owned()),
-    }
-}
-
 impl Run {
     /// Runs the command.
     ///
@@ -87,6 +77,7 @@ impl Run {
             (None, None) => Part::Whole,
         };
         let indices = part.indices(plan.points).map_err(Failure::Usage)?;
+        allow(cost(&plan, &indices)?, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let report = run(&plan, &out, indices.clone(), self.force, &bar)?;
         drop(bar);
@@ -150,19 +141,5 @@ fn unmet(report: &RunReport) -> Result<(), Failure> {
             Wish::Accuracy
         };
         Err(Failure::Unmet(wish, parts.join("; ")))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shards_are_counted_from_one() {
-        assert_eq!(shard("1/3"), Ok(Part::Shard { number: 1, of: 3 }));
-        assert_eq!(shard("3/3"), Ok(Part::Shard { number: 3, of: 3 }));
-        for bad in ["0/3", "4/3", "1", "1/0", "a/b", "1/3/5", "-1/3"] {
-            assert!(shard(bad).is_err(), "{bad}");
-        }
     }
 }

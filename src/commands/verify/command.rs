@@ -3,13 +3,14 @@
 use clap::Args;
 
 use super::{Check, Verifier, VerifyOptions, VerifyReport};
-use crate::cli::budget::within;
+use crate::cli::budget::announce;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error};
 use crate::cli::start::begin;
+use crate::scene::cost::Cost;
 
 /// Check a bundle: checksums, layout, and its numbers recomputed
 ///
@@ -48,7 +49,8 @@ impl Verify {
         let options = VerifyOptions {
             accept_unchecked: self.accept_unchecked,
         };
-        let report = Verifier::limited(within).verify(&self.bundle, options, &bar)?;
+        let limit = |costs: &[Cost]| announce(costs, printer);
+        let report = Verifier::limited(&limit).verify(&self.bundle, options, &bar)?;
         drop(bar);
         for note in &report.notes {
             printer.warning(note);

@@ -18,6 +18,7 @@ mod passive;
 mod route;
 mod worst;
 
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ use crate::RunError;
 use crate::bundle::artefact::{Input, UNITS};
 use crate::bundle::load::Bundle;
 use crate::bundle::manifest::Manifest;
-use crate::design::Design;
+use crate::map::Components;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cost::{self, Cost};
@@ -94,16 +95,23 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
     Verifier::default().verify(path, VerifyOptions::default(), progress)
 }
 
-/// Refuses, with the reason, a cost beyond what the machine grants.
-pub type Limit = fn(&Cost) -> Result<(), String>;
+/// Is given what a bundle takes to verify before anything is solved; a message refuses it.
+#[derive(Clone, Copy)]
+struct Limit<'a>(&'a dyn Fn(&[Cost]) -> Result<(), String>);
+
+impl fmt::Debug for Limit<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Limit")
+    }
+}
 
 /// Verifies one bundle after another. A bundle is computed from its inputs once for all in a row
 /// that name the same inputs and options.
 #[derive(Debug, Default)]
-pub struct Verifier {
+pub struct Verifier<'a> {
     last: Option<(Recipe, Arc<Expected>)>,
-    /// Refuses what takes more memory than allowed.
-    within: Option<Limit>,
+    /// Refuses what takes more than allowed.
+    limit: Option<Limit<'a>>,
 }
 
 /// All that decides the content of a bundle.
@@ -143,20 +151,21 @@ impl Judgement {
     }
 }
 
-impl Verifier {
-    /// One that asks `within` before it computes whether a cost is allowed; a message refuses it.
+impl<'a> Verifier<'a> {
+    /// One that gives `limit` the costs of a bundle before it computes; a message refuses them.
     #[must_use]
-    pub fn limited(within: Limit) -> Self {
+    pub fn limited(limit: &'a dyn Fn(&[Cost]) -> Result<(), String>) -> Self {
         Self {
             last: None,
-            within: Some(within),
+            limit: Some(Limit(limit)),
         }
     }
 
-    fn check_costs(&self, design: &Design, bundle: &Bundle) -> Result<(), RunError> {
-        let Some(within) = self.within else {
+    fn check_costs(&self, sources: &Sources, bundle: &Bundle) -> Result<(), RunError> {
+        let Some(Limit(limit)) = self.limit else {
             return Ok(());
         };
+        let design = &sources.design;
         let made_with = bundle.manifest.made_with.as_ref();
         let of_error = made_with.and_then(|made| made.error).map(|error| {
             ErrorTarget {
@@ -169,12 +178,24 @@ impl Verifier {
         let tolerance = made_with.and_then(|made| made.tolerance).or(of_error);
         // Solved again as the bundle was made, and to judge that a finer time.
         let finer = Tolerances::of_inductances(tolerance).min(CLAIMED_MAX) * FINER;
-        let steel = cost::of_steel(design, Some(finer));
+        let steel = [tolerance, Some(finer)].map(|tolerance| cost::of_steel(design, tolerance));
         let pull = cost::of_pull(design, FINER * PASSIVE_TOLERANCE);
-        for cost in steel.iter().chain(&pull) {
-            within(cost).map_err(RunError::Input)?;
+        let mut costs: Vec<Cost> = steel.into_iter().flatten().chain(pull).collect();
+        for cost in &mut costs {
+            // What the bundle claims is judged, not what was requested.
+            cost.misses = None;
         }
-        Ok(())
+        if let Some(shape) = &sources.shape {
+            // With the bundle, and by the independent route.
+            let again = || cost::of_force_constants(design, &shape.document, tolerance);
+            costs.extend(again().into_iter().chain(again()));
+            // Of its nodes the bundle holds those that the object needs.
+            costs.push(Cost {
+                bytes: 0.0,
+                ..cost::of_map(design, Components::Gz)
+            });
+        }
+        limit(&costs).map_err(RunError::Input)
     }
 
     /// As [`run`].
@@ -209,7 +230,7 @@ impl Verifier {
             progress.end();
             return Ok(all.report(options));
         }
-        self.check_costs(&sources.design, &all.bundle)?;
+        self.check_costs(&sources, &all.bundle)?;
         let expected = self.expected(&mut all, &scene, &sources, progress)?;
         progress.advance(1);
         progress.check()?;

@@ -17,142 +17,23 @@ use serde::{Deserialize, Serialize};
 use nalgebra::{DMatrix, DVector};
 
 use super::CoreShape;
+pub use super::array_resolution::ArrayResolution;
+use super::array_resolution::SOLVER_SHARE;
 use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
-use super::equivalent_dipoles::{ArraySources, Near, spread_over};
-use super::exchange::{Grading, LEAST_GAP, PART, side_panels};
-use super::generatrix::{Generatrix, Resolution};
-use super::reduced_coupling::{OneCore, Received, ReducedCoupling};
+use super::equivalent_dipoles::{ArraySources, Near};
+use super::generatrix::Generatrix;
+use super::reduced_coupling::{BLOCK, Joined, OneCore, Received, ReducedCoupling, SolvedBlock};
 use super::response::{Response, Rings};
 use super::symmetry::{Motion, motions};
-use crate::components::Components;
 use crate::winding::{OnEdge, Winding};
-use fluxform_base::units::MU_0_T_M_PER_A;
 
-/// Most azimuthal modes; beyond, the stated error grows.
-const MOST_MODES: usize = 17;
-/// Most unknowns a core, and most entries of all the dense matrices (2.4 GB): cores closer than
-/// about half their radius ask for more, and the stated error grows.
-const MOST_UNKNOWNS: usize = 3500;
-const MOST_ENTRIES: usize = 300_000_000;
 /// Cores up to which whole grids are exchanged: of more, only what passes between them.
-const MOST_WHOLE: usize = 16;
+pub const MOST_WHOLE: usize = 16;
 /// Share of the tolerance that each part may have which is left out of what passes: a few hundredths
 /// of it is what they come to.
 const PASSED_SHARE: f64 = 0.2;
-/// Share of the tolerance given to the linear solver.
-const SOLVER_SHARE: f64 = 0.01;
-
-/// How finely a coupled array is solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ArrayResolution {
-    /// The outline of each core.
-    pub outline: Resolution,
-    /// Azimuthal modes.
-    pub modes: usize,
-    /// Length of the exchange panels beside the ends of cores and windings, m.
-    pub panel_m: f64,
-    /// Exchange rings a panel.
-    pub order: usize,
-    /// Relative residual of the linear solver.
-    pub residual: f64,
-}
-
-impl ArrayResolution {
-    /// The resolution for a relative error `tolerance`, `closest_m` being the smallest distance
-    /// of two axes.
-    ///
-    /// A mode m that a core sends to another, and gets back, decays like ((d - R)/R)^(-2 m); the
-    /// kernels between two cores are analytic within their gap.
-    #[must_use]
-    pub fn for_tolerance(tolerance: f64, shape: CoreShape, closest_m: f64) -> Self {
-        let tolerance = tolerance.clamp(1e-9, 0.1);
-        // The outline is the cheap part, and the edges' error decays slowest.
-        let outline = Resolution::for_tolerance(0.3 * tolerance);
-        let residual = SOLVER_SHARE * tolerance;
-        if closest_m.is_infinite() {
-            return Self {
-                outline,
-                modes: 1,
-                panel_m: shape.length_m().max(shape.radius_m),
-                order: 2,
-                residual,
-            };
-        }
-        let radius_m = shape.radius_m;
-        let decay = 2.0 * ((closest_m - radius_m) / radius_m).ln();
-        let modes = 2 + ((1.0 / tolerance).ln() / decay.max(1e-3)).ceil() as usize;
-        let gap_m = (closest_m - 2.0 * radius_m).max(LEAST_GAP * radius_m);
-        Self {
-            outline,
-            modes: modes.clamp(2, MOST_MODES),
-            panel_m: PART * gap_m,
-            order: (2.0 - 1.3 * tolerance.log10()).ceil() as usize,
-            residual,
-        }
-    }
-
-    /// The exchange panels of a core about which a winding reaches `winding_length_m` down.
-    pub(super) fn grading(&self, shape: CoreShape, winding_length_m: f64) -> Grading {
-        Grading::new(self.panel_m, shape, winding_length_m)
-    }
-
-    /// Unknowns a core.
-    pub(super) fn unknowns(&self, shape: CoreShape, winding_length_m: f64) -> usize {
-        let grading = self.grading(shape, winding_length_m);
-        let side = side_panels(shape, |z_m| grading.length_m(z_m)).len();
-        let end = (shape.radius_m / self.panel_m).ceil().max(1.0) as usize;
-        let rings = self.order * (side + 2 * end);
-        rings * self.angles()
-    }
-
-    /// Longer exchange panels, if these would take more memory than the caps for an array with
-    /// `offsets` different offsets between cores.
-    pub(super) fn within_memory(
-        mut self,
-        shape: CoreShape,
-        winding_length_m: f64,
-        offsets: usize,
-    ) -> Self {
-        let entries = (MOST_ENTRIES / (offsets + 1)) as f64;
-        let most = MOST_UNKNOWNS.min(entries.sqrt() as usize);
-        while self.unknowns(shape, winding_length_m) > most
-            && self.panel_m < shape.length_m() + shape.radius_m
-        {
-            self.panel_m *= 1.1;
-        }
-        self
-    }
-
-    /// Error of what the closest cores exchange, relative: aliasing in the azimuth, quadrature
-    /// along the panels.
-    pub(super) fn exchange_error(&self, shape: CoreShape, closest_m: f64) -> f64 {
-        let radius_m = shape.radius_m;
-        let azimuth = (radius_m / (closest_m - radius_m)).powf(2.0 * self.modes as f64);
-        let ratio = 2.0 * (closest_m - 2.0 * radius_m) / self.panel_m;
-        let along = (ratio + 1.0_f64.hypot(ratio)).powf(-2.0 * self.order as f64);
-        azimuth.max(along)
-    }
-
-    /// Angles of the exchange grid: a multiple of four, for the array's symmetries; enough for
-    /// the modes' products.
-    #[must_use]
-    pub fn angles(&self) -> usize {
-        (2 * self.modes).next_multiple_of(4)
-    }
-
-    /// The next coarser resolution.
-    #[must_use]
-    pub fn coarser(&self) -> Self {
-        Self {
-            outline: self.outline.coarser(),
-            modes: (self.modes - 1).max(1),
-            order: (self.order - 1).max(2),
-            ..*self
-        }
-    }
-}
 
 /// The solved array, per ampere in each coil.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -187,147 +68,7 @@ enum Potentials {
     Reduced(Received),
 }
 
-/// Refinements after which a tolerance that is not reached is given up, with its estimate.
-const MOST_REFINEMENTS: usize = 4;
-/// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
-const FIRST_AIM: f64 = 2.0;
-/// Distance above the cores, in radii, below which no error is estimated.
-const CLOSEST: f64 = 0.1;
-/// Heights above the cores, in radii, below which the outline is resolved for places close to it.
-const NEAR: f64 = 0.5;
-/// Modes that each refinement adds where places close to the cores are requested.
-const MODES_NEAR: usize = 2;
-/// Drives of many coils of which two resolutions are compared, at most, and the distance of the coils
-/// about which, in the smallest of two.
-const MOST_COMPARED: usize = 8;
-const BESIDE: f64 = 1.6;
-/// Places about every coil at which two resolutions are compared, in units of its outer radius.
-const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
-
 impl CoupledArray {
-    /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as
-    /// the caps on resolution allow: [`CoupledArray::relative_error`] says what was reached.
-    ///
-    /// Domain: as for [`CoupledArray::at_resolution`].
-    ///
-    /// # Errors
-    /// A node of the outline on the winding's edge.
-    pub fn new(
-        winding: &Winding,
-        shape: CoreShape,
-        relative_permeability: f64,
-        positions_m: &[[f64; 2]],
-        tolerance: f64,
-        lowest_m: f64,
-    ) -> Result<Self, OnEdge> {
-        let closest_m = closest_m(positions_m);
-        let offsets = grids_at_once(positions_m);
-        let top_m = shape.top_m.max(0.0);
-        let lowest_m = lowest_m.max(top_m + CLOSEST * shape.radius_m);
-        let near = lowest_m < top_m + NEAR * shape.radius_m;
-        let solve = |resolution: &ArrayResolution| {
-            Self::at_resolution(
-                winding,
-                shape,
-                relative_permeability,
-                positions_m,
-                resolution,
-            )
-        };
-        let mut aim = FIRST_AIM * tolerance;
-        let mut best: Option<Self> = None;
-        for refinement in 0..=MOST_REFINEMENTS {
-            let mut resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
-            if near && resolution.modes > 1 {
-                // Close to a core its own modes are seen, before they have come back from another.
-                resolution.modes = (resolution.modes + MODES_NEAR * refinement).min(MOST_MODES);
-            }
-            let mut resolution = resolution.within_memory(shape, winding.length_m, offsets);
-            let mut coarse = resolution.coarser();
-            if near {
-                resolution.outline = Resolution::near_steel(0.3 * aim);
-                coarse.outline = resolution.outline.coarser_near_steel();
-            }
-            let coarse = solve(&coarse)?;
-            let mut fine = solve(&resolution)?;
-            // Where the caps bind, two wrong solutions may agree by chance.
-            let exchange = 2.0 * resolution.exchange_error(shape, closest_m);
-            fine.relative_error = exchange.max(fine.difference(&coarse, lowest_m, tolerance)?);
-            let better = best
-                .as_ref()
-                .is_none_or(|b| fine.relative_error < b.relative_error);
-            let reached = fine.relative_error <= tolerance;
-            if better {
-                best = Some(fine);
-            }
-            if reached || !better || exchange > tolerance {
-                break;
-            }
-            aim *= 0.3;
-        }
-        Ok(best.expect("at least one resolution was solved"))
-    }
-
-    fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
-        let shape = self.response.outline.shape;
-        let (drives, about) = self.compared();
-        let distance_m = lowest_m - shape.top_m;
-        let near = (lowest_m, distance_m, 0.05 * tolerance);
-        let sources = |array: &Self| {
-            if drives.len() == array.positions_m.len() {
-                ArraySources::of_coils(array, near, false)
-            } else {
-                ArraySources::of_drives(array, &drives, near, false)
-            }
-        };
-        let (fine, coarse) = (sources(self), sources(other));
-        let parts = Components::Gradient;
-        let mut worst = 0.0_f64;
-        for height in [0.0, 1.0, 4.0] {
-            let z_m = lowest_m + height * shape.radius_m;
-            let reach = self.winding.outer_radius_m;
-            let points: Vec<[f64; 3]> = (about.iter())
-                .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
-                .collect();
-            let mut values = vec![0.0; drives.len() * parts.count() * points.len()];
-            let mut others = values.clone();
-            fine.sample(&points, parts, &mut values);
-            coarse.sample(&points, parts, &mut others);
-            // The winding's own gradient adds to the largest, which lies above it.
-            let air = self.winding.field(0.0, z_m)?.gradient_norm();
-            let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
-            let difference = values
-                .iter()
-                .zip(&others)
-                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            worst = worst.max(difference / size);
-        }
-        let added = &self.added_inductance_h;
-        let size = added
-            .amax()
-            .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
-        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
-    }
-
-    /// Drives of which two resolutions are compared, and axes about which: of a few coils all, of many
-    /// some that are not equivalent, and their neighbours.
-    fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
-        let all = &self.positions_m;
-        if all.len() <= MOST_WHOLE {
-            return ((0..all.len()).collect(), all.clone());
-        }
-        let first = representatives(all.len(), &motions(all));
-        let chosen = spread_over(first.len(), MOST_COMPARED);
-        let drives: Vec<usize> = chosen.into_iter().map(|k| first[k]).collect();
-        let reach_m = BESIDE * closest_m(all);
-        let beside = |[x, y]: &&[f64; 2]| {
-            let apart = |drive: &usize| (all[*drive][0] - x).hypot(all[*drive][1] - y);
-            drives.iter().any(|drive| apart(drive) <= reach_m)
-        };
-        let about = all.iter().filter(beside).copied().collect();
-        (drives, about)
-    }
-
     /// Solves at one resolution.
     ///
     /// Domain: cores apart by more than nothing, windings apart or touching.
@@ -356,7 +97,11 @@ impl CoupledArray {
         Ok(array)
     }
 
-    fn uncoupled(
+    /// The array without what cores and windings send each other, and one coil's winding about its core.
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub(super) fn uncoupled(
         winding: &Winding,
         shape: CoreShape,
         relative_permeability: f64,
@@ -466,25 +211,37 @@ impl CoupledArray {
     }
 
     fn couple_reduced(&mut self, excitation: &Excitation, resolution: &ArrayResolution) {
-        let cores = self.positions_m.len();
-        let symmetries = motions(&self.positions_m);
+        let positions_m = self.positions_m.clone();
+        let coupling = self.reduced(excitation, resolution, &positions_m);
+        let first = representatives(positions_m.len(), &motions(&positions_m));
+        let solve = |drives: &[usize]| coupling.solve(drives, resolution.residual);
+        let blocks: Vec<SolvedBlock> = first.chunks(BLOCK).map(solve).collect();
+        self.join(&blocks);
+    }
+
+    /// The exchange of the array's cores, which are at `positions_m`.
+    pub(super) fn reduced<'a>(
+        &self,
+        excitation: &Excitation,
+        resolution: &ArrayResolution,
+        positions_m: &'a [[f64; 2]],
+    ) -> ReducedCoupling<'a> {
         let weights = excitation.flux_weights_wb_per_a(&self.response.outline);
         let core = OneCore {
             response: &self.response,
             winding: &self.winding,
             own_moments: self.response.on_grid(&self.own_layer),
+            own_flux_wb: weights.dot(&self.own_layer),
             flux_by_ring: self.response.layers[0].tr_mul(&weights),
         };
-        let closest_m = closest_m(&self.positions_m);
         let cut = PASSED_SHARE / SOLVER_SHARE * resolution.residual;
-        let coupling = ReducedCoupling::new(&core, &self.positions_m, closest_m, cut);
-        let first = representatives(cores, &symmetries);
-        let solved = coupling.solve(&core, &symmetries, &first, resolution.residual);
+        ReducedCoupling::new(&core, positions_m, closest_m(positions_m), cut)
+    }
+
+    /// Takes the solutions of blocks of drives; for others and their images the array stays uncoupled.
+    pub(super) fn join(&mut self, blocks: &[SolvedBlock]) {
+        let solved = Joined::new(blocks, self.positions_m.len(), &motions(&self.positions_m));
         self.added_inductance_h = solved.inductance_h;
-        let own_flux = weights.dot(&self.own_layer);
-        for coil in 0..cores {
-            self.added_inductance_h[(coil, coil)] += own_flux;
-        }
         self.relative_residual = solved.relative_residual;
         self.iterations = solved.iterations;
         self.potentials = Potentials::Reduced(solved.received);
@@ -595,13 +352,13 @@ impl ArraySources {
         Self::of_coils(array, (lowest_m, distance_m, tolerance), true)
     }
 
-    fn of_coils(array: &CoupledArray, near: (f64, f64, f64), many: bool) -> Self {
+    pub(super) fn of_coils(array: &CoupledArray, near: (f64, f64, f64), many: bool) -> Self {
         let drives: Vec<usize> = (0..array.positions_m.len()).collect();
         Self::of_drives(array, &drives, near, many).driven_by_coils(&array.positions_m)
     }
 
     /// Dipoles for some of the drives.
-    fn of_drives(
+    pub(super) fn of_drives(
         array: &CoupledArray,
         drives: &[usize],
         (lowest_m, distance_m, tolerance): (f64, f64, f64),

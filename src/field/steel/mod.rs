@@ -2,6 +2,8 @@
 
 pub mod array;
 pub mod array_cost;
+pub mod array_request;
+mod array_resolution;
 mod array_sources;
 pub mod array_steel;
 pub mod axial_table;

@@ -24,14 +24,15 @@ use super::response::Response;
 use super::symmetry::{Motion, motions};
 use crate::winding::Winding;
 use fluxform_numerics::block_toeplitz::BlockToeplitz;
-use fluxform_numerics::gmres::gmres;
+use fluxform_numerics::bounded_svd::svd;
+use fluxform_numerics::gmres::{Outcome, gmres};
 
 /// Most applications of the exchange.
 const MOST_STEPS: usize = 120;
 /// Columns that cores answer to at a time: a few milliseconds.
 const ANSWERED: usize = 256;
-/// Drives that are solved together: memory does not grow with their number.
-const TOGETHER: usize = 32;
+/// Drives that are solved together, at most: fixed, so that bytes do not depend on who solves which.
+pub(super) const BLOCK: usize = 10;
 /// Distances, in the smallest of two axes, from which on fewer columns do.
 const DISTANCES: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Cells of a lattice for every core on it, at most, for which transforms pay.
@@ -95,6 +96,24 @@ fn norm(mode: usize, angles: usize) -> f64 {
     (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt()
 }
 
+/// The largest singular value; where it is not known, the length of the longest column, which is no more.
+fn largest_of(columns: DMatrix<f64>) -> f64 {
+    let longest = (columns.column_iter()).fold(0.0_f64, |most, column| most.max(column.norm()));
+    svd(columns, [false, false]).map_or(longest, |svd| svd.singular_values.max())
+}
+
+/// Orthonormal directions that carry `columns` but for parts below `least`; where singular values are not
+/// known, directions that carry all of them.
+fn carrying(columns: DMatrix<f64>, least: f64) -> DMatrix<f64> {
+    let whole = || columns.clone().qr().q();
+    let Some(svd) = svd(columns.clone(), [true, false]) else {
+        return whole();
+    };
+    // Sorted by falling singular value.
+    let large = svd.singular_values.iter().filter(|s| **s > least);
+    (svd.u.as_ref()).map_or_else(whole, |u| u.columns(0, large.count()).into_owned())
+}
+
 impl Basis {
     /// Waves that carry all columns of `examples`, one matrix for each of [`DISTANCES`], but for parts
     /// below `cut` of the largest; `constant` is put first.
@@ -132,18 +151,12 @@ impl Basis {
         let largest = parts[parts.len() - modes..]
             .iter()
             .zip(&found)
-            .map(|(part, known)| without(part, known).singular_values().max())
+            .map(|(part, known)| largest_of(without(part, known)))
             .fold(0.0, f64::max);
         let mut counts = [0; DISTANCES.len()];
         for (distance, parts) in parts.chunks(modes).enumerate() {
             for (mode, part) in parts.iter().enumerate() {
-                let svd = without(part, &found[mode]).svd(true, false);
-                let large = svd.singular_values.iter().filter(|s| **s > cut * largest);
-                let Some(vectors) = svd.u.as_ref() else {
-                    continue;
-                };
-                // Sorted by falling singular value.
-                let more = vectors.columns(0, large.count()).into_owned();
+                let more = carrying(without(part, &found[mode]), cut * largest);
                 count = push(mode, &more);
                 let first = found[mode].ncols();
                 let known = std::mem::replace(&mut found[mode], DMatrix::zeros(0, 0));
@@ -362,6 +375,9 @@ pub(super) struct ReducedCoupling<'a> {
     answer: DMatrix<f64>,
     /// Coefficients felt of a core under its own winding.
     own: DVector<f64>,
+    /// Flux through the core's own coil for each coefficient received, Wb/A, and of its own layer.
+    flux: DVector<f64>,
+    own_flux_wb: f64,
 }
 
 /// Potentials that every core receives, per ampere of every drive.
@@ -426,13 +442,72 @@ impl Received {
     }
 }
 
-/// A solved exchange.
-pub(super) struct Reduced {
+/// The solutions for some drives.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SolvedBlock {
+    pub(super) drives: Vec<usize>,
+    waves: Vec<Wave>,
+    /// Potentials that every core receives, [wave, core], for each.
+    received: Vec<DMatrix<f64>>,
+    /// Steel's flux through every coil, [coil, drive], Wb/A.
+    flux_wb: DMatrix<f64>,
+    relative_residual: f64,
+    iterations: usize,
+}
+
+/// Solved blocks put together.
+pub(super) struct Joined {
     pub(super) received: Received,
-    /// Steel's part of self and mutual inductances, [coil, drive], H, but for a core's own layer.
+    /// Steel's part of self and mutual inductances, [coil, drive], H; zero for drives of no block.
     pub(super) inductance_h: DMatrix<f64>,
     pub(super) relative_residual: f64,
     pub(super) iterations: usize,
+}
+
+impl Joined {
+    /// The blocks' drives and their images under the array's motions, `symmetries`.
+    pub(super) fn new(blocks: &[SolvedBlock], cores: usize, symmetries: &[Motion]) -> Self {
+        let motions = symmetries.iter().map(|motion| {
+            let mut origins = vec![0; cores];
+            for (from, to) in motion.coil.iter().enumerate() {
+                origins[*to] = from;
+            }
+            (motion.clone(), origins)
+        });
+        let mut joined = Self {
+            received: Received {
+                waves: blocks
+                    .first()
+                    .map_or(Vec::new(), |block| block.waves.clone()),
+                of_first: Vec::new(),
+                from: vec![(0, 0); cores],
+                motions: motions.collect(),
+            },
+            inductance_h: DMatrix::zeros(cores, cores),
+            relative_residual: 0.0,
+            iterations: 0,
+        };
+        for block in blocks {
+            joined.relative_residual = joined.relative_residual.max(block.relative_residual);
+            joined.iterations = joined.iterations.max(block.iterations);
+            for (column, drive) in block.drives.iter().enumerate() {
+                let place = joined.received.of_first.len();
+                joined
+                    .received
+                    .of_first
+                    .push(block.received[column].clone());
+                for (number, motion) in symmetries.iter().enumerate().rev() {
+                    let to = motion.coil[*drive];
+                    joined.received.from[to] = (place, number);
+                    for coil in 0..cores {
+                        joined.inductance_h[(motion.coil[coil], to)] =
+                            block.flux_wb[(coil, column)];
+                    }
+                }
+            }
+        }
+        joined
+    }
 }
 
 /// One core: its response, winding and layer under it.
@@ -441,8 +516,20 @@ pub(super) struct OneCore<'a> {
     pub(super) winding: &'a Winding,
     /// Moments on the exchange grid under its own winding, A m^2 a radian per ampere.
     pub(super) own_moments: DVector<f64>,
+    /// Flux of its own layer through the coil, Wb/A.
+    pub(super) own_flux_wb: f64,
     /// Flux through the coil for a potential of mode 0 on each ring, Wb/A.
     pub(super) flux_by_ring: DVector<f64>,
+}
+
+/// Flux through a core's own coil for each coefficient of `waves`, `by_ring` being that for a potential of
+/// mode 0 on each ring, Wb/A.
+fn own_flux(waves: &[Wave], by_ring: &DVector<f64>) -> DVector<f64> {
+    let of_wave = |wave: &Wave| match wave.mode {
+        0 => wave.rings.dot(by_ring),
+        _ => 0.0,
+    };
+    DVector::from_iterator(waves.len(), waves.iter().map(of_wave))
 }
 
 impl<'a> ReducedCoupling<'a> {
@@ -480,6 +567,8 @@ impl<'a> ReducedCoupling<'a> {
             closest_m,
             answer: felt.on_grid.tr_mul(&responses),
             own: felt.on_grid.tr_mul(&core.own_moments),
+            flux: own_flux(&received.waves, &core.flux_by_ring),
+            own_flux_wb: core.own_flux_wb,
             received,
             felt,
             layout,
@@ -627,76 +716,38 @@ impl<'a> ReducedCoupling<'a> {
         felt.reshape_generic(nalgebra::Dyn(size * cores), nalgebra::Dyn(columns))
     }
 
-    /// Solves for one ampere in every coil in turn, `symmetries` being the array's motions, to a relative
-    /// `residual`.
-    pub(super) fn solve(
-        &self,
-        core: &OneCore,
-        symmetries: &[Motion],
-        first: &[usize],
-        residual: f64,
-    ) -> Reduced {
+    /// Solves for one ampere in each of some coils in turn, to a relative `residual`.
+    pub(super) fn solve(&self, drives: &[usize], residual: f64) -> SolvedBlock {
         let cores = self.positions_m.len();
         let size = self.received.waves.len();
-        let mut reduced = Reduced {
-            received: Received {
-                waves: self.received.waves.clone(),
-                of_first: Vec::new(),
-                from: vec![(0, 0); cores],
-                motions: (symmetries.iter())
-                    .map(|motion| {
-                        let mut origins = vec![0; cores];
-                        for (from, to) in motion.coil.iter().enumerate() {
-                            origins[*to] = from;
-                        }
-                        (motion.clone(), origins)
-                    })
-                    .collect(),
-            },
-            inductance_h: DMatrix::zeros(cores, cores),
-            relative_residual: 0.0,
-            iterations: 0,
-        };
-        // Potentials of mode 0 on the rings for each coefficient, and so flux through the core's own coil.
-        let own_flux = DVector::from_iterator(
-            size,
-            self.received.waves.iter().map(|wave| {
-                if wave.mode == 0 {
-                    wave.rings.dot(&core.flux_by_ring)
-                } else {
-                    0.0
-                }
-            }),
-        );
-        for drives in first.chunks(TOGETHER) {
-            let solved = self.solve_some(drives, residual, &mut reduced);
-            let mut flux = self.flux_wb(&solved);
-            for (column, drive) in drives.iter().enumerate() {
-                let of_drive = solved.column(column).into_owned();
-                let of_drive = of_drive.reshape_generic(nalgebra::Dyn(size), nalgebra::Dyn(cores));
-                for coil in 0..cores {
-                    let [from, to] = [coil, *drive].map(|at| self.positions_m[at]);
-                    let offset_m = [to[0] - from[0], to[1] - from[1]];
-                    let driven = self.layout.of(offset_m);
-                    flux[(coil, column)] += own_flux.dot(&of_drive.column(coil))
-                        + driven.map_or(0.0, |(number, _)| self.passed[number].own_flux_wb);
-                }
-                let place = reduced.received.of_first.len();
-                reduced.received.of_first.push(of_drive);
-                for (number, motion) in symmetries.iter().enumerate().rev() {
-                    let to = motion.coil[*drive];
-                    reduced.received.from[to] = (place, number);
-                    for coil in 0..cores {
-                        reduced.inductance_h[(motion.coil[coil], to)] = flux[(coil, column)];
-                    }
-                }
+        let (solved, outcome) = self.solve_some(drives, residual);
+        let mut flux_wb = self.flux_wb(&solved);
+        let mut received = Vec::with_capacity(drives.len());
+        for (column, drive) in drives.iter().enumerate() {
+            let of_drive = solved.column(column).into_owned();
+            let of_drive = of_drive.reshape_generic(nalgebra::Dyn(size), nalgebra::Dyn(cores));
+            for coil in 0..cores {
+                let [from, to] = [coil, *drive].map(|at| self.positions_m[at]);
+                let offset_m = [to[0] - from[0], to[1] - from[1]];
+                let driven = self.layout.of(offset_m);
+                flux_wb[(coil, column)] += self.flux.dot(&of_drive.column(coil))
+                    + driven.map_or(0.0, |(number, _)| self.passed[number].own_flux_wb);
             }
+            flux_wb[(*drive, column)] += self.own_flux_wb;
+            received.push(of_drive);
         }
-        reduced
+        SolvedBlock {
+            drives: drives.to_vec(),
+            waves: self.received.waves.clone(),
+            received,
+            flux_wb,
+            relative_residual: outcome.relative_residual,
+            iterations: outcome.iterations,
+        }
     }
 
     /// Coefficients that every core receives, windings' and cores', for some drives.
-    fn solve_some(&self, drives: &[usize], residual: f64, reduced: &mut Reduced) -> DMatrix<f64> {
+    fn solve_some(&self, drives: &[usize], residual: f64) -> (DMatrix<f64>, Outcome) {
         let cores = self.positions_m.len();
         let (rows, size) = (self.received.waves.len(), self.felt.waves.len());
         let mut windings = DMatrix::zeros(rows * cores, drives.len());
@@ -721,9 +772,7 @@ impl<'a> ReducedCoupling<'a> {
         let outcome = gmres(&rhs, residual, MOST_STEPS, |felt| {
             felt - self.answers(self.send(felt))
         });
-        reduced.relative_residual = reduced.relative_residual.max(outcome.relative_residual);
-        reduced.iterations = reduced.iterations.max(outcome.iterations);
-        windings + self.send(&outcome.solutions)
+        (windings + self.send(&outcome.solutions), outcome)
     }
 }
 

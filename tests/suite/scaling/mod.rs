@@ -124,7 +124,7 @@ fn row(size: f64, threads: usize, timing: &Timing) -> SizeRow {
 /// A process that fails; interruption.
 pub fn laws(
     request: &BenchRequest,
-    earlier: Vec<Law>,
+    earlier: &[Law],
     progress: &dyn Progress,
 ) -> Result<Vec<Law>, RunError> {
     let quick = request.pace.quick;

@@ -1,4 +1,5 @@
 use super::*;
+use crate::components::Components;
 
 /// A kernel is singular a gap away from a panel of one and a half gaps: half-axes 4/3 and 5/3
 /// of its Bernstein ellipse in units of half the panel, hence an error of 3^(-2 n).

@@ -162,23 +162,28 @@ fn one_row_of_the_scaling_is_a_process_of_its_own() {
 #[test]
 fn laws_that_are_not_measured_again_stay() {
     let folder = tempfile::tempdir().unwrap();
-    let measured = |law: &str| {
-        let part = [
-            "--quick",
-            "--stage",
-            "inductance",
-            "--scaling",
-            "--law",
-            law,
-        ];
-        json(&bench(
-            folder.path(),
-            &[&part[..], &["--format", "json"]].concat(),
-        ))["scaling"]
-            .clone()
+    let measured = |stage: &[&str], law: &str| {
+        let part = ["--quick", "--scaling", "--law", law, "--format", "json"];
+        json(&bench(folder.path(), &[stage, &part].concat()))
     };
-    let points = measured("lambda-path:points");
-    let both = measured("inductance:coils");
+    let first = measured(&["--stage", "inductance"], "lambda-path:points");
+    let points = &first["scaling"];
+    // Without a stage no curve is measured again, and those of the folder stay.
+    let second = measured(&[], "inductance:coils");
+    assert_eq!(second["stages"].as_array().unwrap().len(), 1);
+    for kept in ["stages", "accuracy", "inputs", "made_with"] {
+        assert_eq!(second[kept], first[kept], "{kept}");
+    }
+    let table =
+        std::fs::read_to_string(folder.path().join("results/bench-part/bench.csv")).unwrap();
+    assert!(
+        table
+            .lines()
+            .skip(1)
+            .all(|row| row.starts_with("inductance,"))
+            && table.lines().count() > 3
+    );
+    let both = &second["scaling"];
     let laws = both.as_array().unwrap();
     // In the order of a whole run, whichever was measured last.
     assert_eq!(

@@ -1,0 +1,506 @@
+//! Coupled arrays solved to a tolerance; of many cores in blocks of drives, which several runs or machines
+//! may share.
+//!
+//! Resolutions are compared by all drives of a few cores, of many by some that are not equivalent and the
+//! places about them. The others are then solved once, by the resolution that does, in blocks that depend
+//! on the array alone: whoever solves a block, its numbers are the same to the bit.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::CoreShape;
+use super::array::{CoupledArray, MOST_WHOLE, closest_m, grids_at_once, representatives};
+use super::array_resolution::{ArrayResolution, MOST_MODES};
+use super::cored_coil::Excitation;
+use super::equivalent_dipoles::{ArraySources, spread_over};
+use super::generatrix::Resolution;
+pub use super::reduced_coupling::SolvedBlock;
+use super::reduced_coupling::{BLOCK, ReducedCoupling};
+use super::symmetry::motions;
+use crate::components::Components;
+use crate::winding::{OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
+
+/// Refinements after which a tolerance that is not reached is given up, with its estimate.
+const MOST_REFINEMENTS: usize = 4;
+/// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
+const FIRST_AIM: f64 = 2.0;
+/// Distance above the cores, in radii, below which no error is estimated.
+const CLOSEST: f64 = 0.1;
+/// Heights above the cores, in radii, below which the outline is resolved for places close to it.
+const NEAR: f64 = 0.5;
+/// Modes that each refinement adds where places close to the cores are requested.
+const MODES_NEAR: usize = 2;
+/// Drives of many coils by which two resolutions are compared, at most, and the distance of the coils
+/// about which, in the smallest of two.
+const MOST_COMPARED: usize = 8;
+const BESIDE: f64 = 1.6;
+/// Drives up to which all make one block: to solve a few by themselves would take longer.
+const MOST_AT_ONCE: usize = 12;
+/// Places about every coil at which two resolutions are compared, in units of its outer radius.
+const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+
+/// An array that is to be solved to a tolerance.
+///
+/// Domain: as for [`CoupledArray::at_resolution`].
+#[derive(Debug, Clone, Copy)]
+pub struct ArrayRequest<'a> {
+    /// The winding of every coil.
+    pub winding: &'a Winding,
+    /// Every core.
+    pub shape: CoreShape,
+    /// Of the cores.
+    pub relative_permeability: f64,
+    /// Axes, m.
+    pub positions_m: &'a [[f64; 2]],
+    /// The largest estimated error, as [`CoupledArray::relative_error`] has it.
+    pub tolerance: f64,
+    /// Places are no lower, m.
+    pub lowest_m: f64,
+}
+
+/// The resolution that was chosen for an array of many cores, and the drives that it was chosen by.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Choice {
+    refinement: usize,
+    relative_error: f64,
+    compared: SolvedBlock,
+}
+
+/// Where the solved parts of one array are kept; all of them belong to the same [`ArrayRequest`].
+pub trait DriveCache {
+    /// The choice, if a run has made it.
+    fn choice(&self) -> Option<Choice>;
+    /// Keeps it.
+    fn keep_choice(&self, choice: &Choice);
+    /// A block, if a run has solved it.
+    fn block(&self, number: usize) -> Option<SolvedBlock>;
+    /// Keeps it.
+    fn keep_block(&self, number: usize, block: &SolvedBlock);
+}
+
+/// Nothing is kept.
+#[derive(Debug, Clone, Copy)]
+pub struct NoCache;
+
+impl DriveCache for NoCache {
+    fn choice(&self) -> Option<Choice> {
+        None
+    }
+    fn keep_choice(&self, _: &Choice) {}
+    fn block(&self, _: usize) -> Option<SolvedBlock> {
+        None
+    }
+    fn keep_block(&self, _: usize, _: &SolvedBlock) {}
+}
+
+/// An array at one resolution.
+struct Attempt<'a> {
+    refinement: usize,
+    /// Coupled for the compared drives at least.
+    array: CoupledArray,
+    /// Of many cores what solves other drives, and the drives that were compared.
+    coupling: Option<ReducedCoupling<'a>>,
+    compared: Option<SolvedBlock>,
+}
+
+impl CoupledArray {
+    /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as
+    /// the caps on resolution allow: [`CoupledArray::relative_error`] says what was reached.
+    ///
+    /// Domain: as for [`CoupledArray::at_resolution`].
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn new(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        positions_m: &[[f64; 2]],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, OnEdge> {
+        let request = ArrayRequest {
+            winding,
+            shape,
+            relative_permeability,
+            positions_m,
+            tolerance,
+            lowest_m,
+        };
+        request.solve(&NoCache)
+    }
+
+    /// The larger difference of gradients and inductances from those of `other` for `drives`, at places
+    /// beside the axes `about` from `lowest_m` up, evaluated well within `tolerance`.
+    fn difference(
+        &self,
+        other: &Self,
+        (drives, about): (&[usize], &[[f64; 2]]),
+        lowest_m: f64,
+        tolerance: f64,
+    ) -> Result<f64, OnEdge> {
+        let shape = self.response.outline.shape;
+        let distance_m = lowest_m - shape.top_m;
+        let near = (lowest_m, distance_m, 0.05 * tolerance);
+        let sources = |array: &Self| {
+            if drives.len() == array.positions_m.len() {
+                ArraySources::of_coils(array, near, false)
+            } else {
+                ArraySources::of_drives(array, drives, near, false)
+            }
+        };
+        let (fine, coarse) = (sources(self), sources(other));
+        let parts = Components::Gradient;
+        let mut worst = 0.0_f64;
+        for height in [0.0, 1.0, 4.0] {
+            let z_m = lowest_m + height * shape.radius_m;
+            let reach = self.winding.outer_radius_m;
+            let points: Vec<[f64; 3]> = (about.iter())
+                .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
+                .collect();
+            let mut values = vec![0.0; drives.len() * parts.count() * points.len()];
+            let mut others = values.clone();
+            fine.sample(&points, parts, &mut values);
+            coarse.sample(&points, parts, &mut others);
+            // The winding's own gradient adds to the largest, which lies above it.
+            let air = self.winding.field(0.0, z_m)?.gradient_norm();
+            let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
+            let difference = values
+                .iter()
+                .zip(&others)
+                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            worst = worst.max(difference / size);
+        }
+        let added = &self.added_inductance_h;
+        let size = added
+            .amax()
+            .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
+        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+    }
+}
+
+impl<'a> ArrayRequest<'a> {
+    /// The drives of every block: the first holds those that are compared. None of a few cores, which are
+    /// solved whole.
+    fn drives_of_blocks(&self) -> Vec<Vec<usize>> {
+        let cores = self.positions_m.len();
+        if cores <= MOST_WHOLE {
+            return Vec::new();
+        }
+        let first = representatives(cores, &motions(self.positions_m));
+        if first.len() <= MOST_AT_ONCE {
+            return vec![first];
+        }
+        let chosen = spread_over(first.len(), MOST_COMPARED);
+        let compared = chosen.iter().map(|k| first[*k]).collect();
+        let others: Vec<usize> = (0..first.len())
+            .filter(|k| !chosen.contains(k))
+            .map(|k| first[k])
+            .collect();
+        let mut blocks = vec![compared];
+        blocks.extend(others.chunks(BLOCK).map(<[usize]>::to_vec));
+        blocks
+    }
+
+    /// Number of blocks of drives; 0 of a few cores, which are solved at once.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.drives_of_blocks().len()
+    }
+
+    /// Solves the array, and keeps the blocks that `cache` does not hold yet.
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn solve(&self, cache: &dyn DriveCache) -> Result<CoupledArray, OnEdge> {
+        let blocks = self.drives_of_blocks();
+        if blocks.is_empty() {
+            return Ok(self.best()?.array);
+        }
+        let (choice, mut attempt) = self.choice(cache, &blocks[0])?;
+        let mut solved = vec![choice.compared];
+        for (number, drives) in blocks.iter().enumerate().skip(1) {
+            let known = cache.block(number).filter(|block| block.drives == *drives);
+            solved.push(match known {
+                Some(block) => block,
+                None => {
+                    let block = self.solve_block(drives, choice.refinement, &mut attempt)?;
+                    cache.keep_block(number, &block);
+                    block
+                }
+            });
+        }
+        let mut array = match attempt {
+            Some(attempt) => attempt.array,
+            None => self.uncoupled(&self.resolutions(choice.refinement)[1])?.0,
+        };
+        array.join(&solved);
+        array.relative_error = choice.relative_error;
+        Ok(array)
+    }
+
+    /// Solves those of the blocks `numbers` that `cache` does not hold, and keeps them; how many they were.
+    /// The choice of the resolution is the first block, and solved with any other that it is missing for.
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn solve_blocks(
+        &self,
+        numbers: Range<usize>,
+        cache: &dyn DriveCache,
+    ) -> Result<usize, OnEdge> {
+        let blocks = self.drives_of_blocks();
+        if numbers.is_empty() {
+            return Ok(0);
+        }
+        let (choice, mut attempt) = self.choice(cache, &blocks[0])?;
+        let mut solved = usize::from(numbers.contains(&0) && attempt.is_some());
+        for number in numbers.filter(|number| *number > 0) {
+            let drives = &blocks[number];
+            if cache
+                .block(number)
+                .is_none_or(|block| block.drives != *drives)
+            {
+                let block = self.solve_block(drives, choice.refinement, &mut attempt)?;
+                cache.keep_block(number, &block);
+                solved += 1;
+            }
+        }
+        Ok(solved)
+    }
+
+    /// The choice of the resolution by the drives `compared`, and what it was made from if that was now.
+    fn choice(
+        &self,
+        cache: &dyn DriveCache,
+        compared: &[usize],
+    ) -> Result<(Choice, Option<Attempt<'a>>), OnEdge> {
+        let known = cache.choice();
+        if let Some(choice) = known.filter(|choice| choice.compared.drives == compared) {
+            return Ok((choice, None));
+        }
+        let mut best = self.best()?;
+        let choice = Choice {
+            refinement: best.refinement,
+            relative_error: best.array.relative_error,
+            compared: best
+                .compared
+                .take()
+                .expect("of many cores some drives are compared"),
+        };
+        cache.keep_choice(&choice);
+        Ok((choice, Some(best)))
+    }
+
+    /// Solves some drives of many cores after a refinement, by the exchange that `attempt` has or is given.
+    fn solve_block(
+        &self,
+        drives: &[usize],
+        refinement: usize,
+        attempt: &mut Option<Attempt<'a>>,
+    ) -> Result<SolvedBlock, OnEdge> {
+        let [_, resolution] = self.resolutions(refinement);
+        let coupling = match attempt.take() {
+            Some(Attempt {
+                coupling: Some(coupling),
+                array,
+                ..
+            }) => (array, coupling),
+            _ => self.many(&resolution)?,
+        };
+        let block = coupling.1.solve(drives, resolution.residual);
+        *attempt = Some(Attempt {
+            refinement,
+            array: coupling.0,
+            coupling: Some(coupling.1),
+            compared: None,
+        });
+        Ok(block)
+    }
+
+    /// The coarse and the fine resolution after some refinements.
+    fn resolutions(&self, refinement: usize) -> [ArrayResolution; 2] {
+        let (shape, positions_m) = (self.shape, self.positions_m);
+        let aim = (0..refinement).fold(FIRST_AIM * self.tolerance, |aim, _| 0.3 * aim);
+        let mut fine = ArrayResolution::for_tolerance(aim, shape, closest_m(positions_m));
+        let near = self.lowest_m() < shape.top_m.max(0.0) + NEAR * shape.radius_m;
+        if near && fine.modes > 1 {
+            // Close to a core its own modes are seen, before they have come back from another.
+            fine.modes = (fine.modes + MODES_NEAR * refinement).min(MOST_MODES);
+        }
+        let offsets = grids_at_once(positions_m);
+        let mut fine = fine.within_memory(shape, self.winding.length_m, offsets);
+        let mut coarse = fine.coarser();
+        if near {
+            fine.outline = Resolution::near_steel(0.3 * aim);
+            coarse.outline = fine.outline.coarser_near_steel();
+        }
+        [coarse, fine]
+    }
+
+    /// The least height for which an error is estimated, m.
+    fn lowest_m(&self) -> f64 {
+        let above_m = self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m;
+        self.lowest_m.max(above_m)
+    }
+
+    /// The array at the first resolution that does, or that of the least estimated error; of many cores
+    /// solved for the compared drives alone.
+    fn best(&self) -> Result<Attempt<'a>, OnEdge> {
+        let (drives, about) = self.compared();
+        let solved = self
+            .drives_of_blocks()
+            .into_iter()
+            .next()
+            .unwrap_or_default();
+        let mut best: Option<Attempt<'a>> = None;
+        for refinement in 0..=MOST_REFINEMENTS {
+            let [coarse, fine] = self.resolutions(refinement);
+            // Where the caps bind, two wrong solutions may agree by chance.
+            let exchange = 2.0 * fine.exchange_error(self.shape, closest_m(self.positions_m));
+            let coarse = self.attempt(refinement, &coarse, &solved)?.array;
+            let mut fine = self.attempt(refinement, &fine, &solved)?;
+            let compared = (&drives[..], &about[..]);
+            let difference =
+                (fine.array).difference(&coarse, compared, self.lowest_m(), self.tolerance)?;
+            let error = exchange.max(difference);
+            fine.array.relative_error = error;
+            let better = best.as_ref().is_none_or(|b| error < b.array.relative_error);
+            let reached = error <= self.tolerance;
+            if better {
+                if !reached {
+                    // The next resolution's matrices take its memory.
+                    fine.coupling = None;
+                }
+                best = Some(fine);
+            }
+            if reached || !better || exchange > self.tolerance {
+                break;
+            }
+        }
+        Ok(best.expect("at least one resolution was solved"))
+    }
+
+    /// The array at one resolution, of many cores for `drives`.
+    fn attempt(
+        &self,
+        refinement: usize,
+        resolution: &ArrayResolution,
+        drives: &[usize],
+    ) -> Result<Attempt<'a>, OnEdge> {
+        if self.positions_m.len() <= MOST_WHOLE {
+            let array = CoupledArray::at_resolution(
+                self.winding,
+                self.shape,
+                self.relative_permeability,
+                self.positions_m,
+                resolution,
+            )?;
+            return Ok(Attempt {
+                refinement,
+                array,
+                coupling: None,
+                compared: None,
+            });
+        }
+        let (mut array, coupling) = self.many(resolution)?;
+        let compared = coupling.solve(drives, resolution.residual);
+        array.join(std::slice::from_ref(&compared));
+        Ok(Attempt {
+            refinement,
+            array,
+            coupling: Some(coupling),
+            compared: Some(compared),
+        })
+    }
+
+    /// Many cores that are not coupled yet, and what couples them.
+    fn many(
+        &self,
+        resolution: &ArrayResolution,
+    ) -> Result<(CoupledArray, ReducedCoupling<'a>), OnEdge> {
+        let (array, excitation) = self.uncoupled(resolution)?;
+        let coupling = array.reduced(&excitation, resolution, self.positions_m);
+        Ok((array, coupling))
+    }
+
+    fn uncoupled(
+        &self,
+        resolution: &ArrayResolution,
+    ) -> Result<(CoupledArray, Excitation), OnEdge> {
+        CoupledArray::uncoupled(
+            self.winding,
+            self.shape,
+            self.relative_permeability,
+            self.positions_m,
+            resolution,
+        )
+    }
+
+    /// Drives by which two resolutions are compared, and axes about which: of a few coils all, of many
+    /// those of the first block, and their neighbours.
+    fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
+        let all = self.positions_m;
+        let Some(block) = self.drives_of_blocks().into_iter().next() else {
+            return ((0..all.len()).collect(), all.to_vec());
+        };
+        let chosen = spread_over(block.len(), MOST_COMPARED);
+        let drives: Vec<usize> = chosen.into_iter().map(|k| block[k]).collect();
+        let reach_m = BESIDE * closest_m(all);
+        let beside = |[x, y]: &&[f64; 2]| {
+            let apart = |drive: &usize| (all[*drive][0] - x).hypot(all[*drive][1] - y);
+            drives.iter().any(|drive| apart(drive) <= reach_m)
+        };
+        let about = all.iter().filter(beside).copied().collect();
+        (drives, about)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A resolution is chosen by some drives: what is claimed holds for the others too.
+    #[test]
+    fn the_stated_error_covers_drives_that_were_not_compared() {
+        let winding = Winding {
+            inner_radius_m: 0.0026,
+            outer_radius_m: 0.0045,
+            length_m: 0.037,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.0025,
+            bottom_m: -0.041,
+            top_m: 0.0007,
+        };
+        // A lattice with two holes: no two coils are equivalent.
+        let positions_m: Vec<[f64; 2]> = (0..25)
+            .filter(|cell| ![3, 16].contains(cell))
+            .map(|cell| [0.0097 * f64::from(cell % 5), 0.0097 * f64::from(cell / 5)])
+            .collect();
+        let request = |tolerance: f64| ArrayRequest {
+            winding: &winding,
+            shape,
+            relative_permeability: 470.0,
+            positions_m: &positions_m,
+            tolerance,
+            lowest_m: 0.013,
+        };
+        let coarse = request(1e-3);
+        let blocks = coarse.drives_of_blocks();
+        assert_eq!(blocks.iter().map(Vec::len).collect::<Vec<_>>(), [8, 10, 5]);
+        let (array, truth) = (coarse.solve(&NoCache), request(1e-4).solve(&NoCache));
+        let (array, truth) = (array.unwrap(), truth.unwrap());
+        let others: Vec<usize> = blocks[1..].concat();
+        let compared = (&others[..], &positions_m[..]);
+        let error = array.difference(&truth, compared, 0.013, 1e-5).unwrap();
+        assert!(
+            error < array.relative_error && array.relative_error < 1e-3,
+            "{error:e} {:e}",
+            array.relative_error
+        );
+    }
+}
