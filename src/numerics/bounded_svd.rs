@@ -10,7 +10,7 @@ const MOST_STEPS: usize = 30;
 /// What counts as zero beside its neighbours, in units of the last place.
 const ZERO: f64 = 5.0 * f64::EPSILON;
 
-/// The singular values of `matrix`, falling, with left and right vectors as asked for; `None` where the
+/// The singular values of `matrix`, falling, with left and right vectors as requested; `None` where the
 /// iteration does not end within 30 steps a value.
 #[must_use]
 pub fn svd(matrix: DMatrix<f64>, [left, right]: [bool; 2]) -> Option<SVD<f64, Dyn, Dyn>> {
