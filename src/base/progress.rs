@@ -66,6 +66,16 @@ pub fn poll() {
     }
 }
 
+/// Tasks, at most, of a parallel loop over many cheap items.
+const MOST_TASKS: usize = 1024;
+
+/// Items that a task of a parallel loop over `count` cheap items takes at least, for `with_min_len`: every task
+/// that meets a stop unwinds, which takes longer than thousands of items, so there must not be many.
+#[must_use]
+pub const fn items_a_task(count: usize) -> usize {
+    count / MOST_TASKS + 1
+}
+
 #[cold]
 fn leave() {
     // A destructor that runs while the thread unwinds must not unwind again.

@@ -316,6 +316,7 @@ impl<'a> Layer<'a> {
         self.covering
             .par_iter_mut()
             .zip(&other.covering)
+            .with_min_len(fluxform_base::progress::items_a_task(other.covering.len()))
             .for_each(|(mine, theirs)| {
                 fluxform_base::progress::poll();
                 *mine = higher(triangles, *mine, *theirs);
@@ -335,6 +336,7 @@ impl<'a> Layer<'a> {
         }
         self.covering
             .par_iter()
+            .with_min_len(fluxform_base::progress::items_a_task(self.covering.len()))
             .map(|hit| {
                 fluxform_base::progress::poll();
                 hit.sample(triangles)

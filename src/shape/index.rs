@@ -66,6 +66,7 @@ impl Index {
         }
         let pairs: Vec<(u32, u32)> = (0..triangles.len())
             .into_par_iter()
+            .with_min_len(fluxform_base::progress::items_a_task(triangles.len()))
             .flat_map_iter(|k| {
                 let mut found = Vec::new();
                 raster.touched(&triangles[k], &mut |row, columns| {
@@ -121,7 +122,10 @@ impl Raster {
             });
             count
         };
-        triangles.par_iter().map(touched).sum()
+        (triangles.par_iter())
+            .with_min_len(fluxform_base::progress::items_a_task(triangles.len()))
+            .map(touched)
+            .sum()
     }
 
     /// Gives the buckets that a triangle touches, row by row.

@@ -445,6 +445,7 @@ fn broken_cells(
     let cells = 0..across * rows.saturating_sub(1);
     let mut broken: Vec<(usize, f64)> = cells
         .into_par_iter()
+        .with_min_len(fluxform_base::progress::items_a_task(across * rows))
         .map(|cell| {
             if cell % STRIDE == 0 {
                 progress.check()?;
@@ -519,6 +520,7 @@ fn ends(
     let place = |k: usize| [grid.x_m.node(k % columns), grid.y_m.node(k / columns)];
     let parts: Result<Vec<(Side, f64)>, Interrupted> = mixed
         .par_iter()
+        .with_min_len(fluxform_base::progress::items_a_task(mixed.len()))
         .enumerate()
         .map(|(index, &(side, [a, b]))| {
             if index % STRIDE == 0 {

@@ -381,6 +381,7 @@ fn mark(
 ) -> Result<(), ShapeError> {
     let places = (0..points.len()).into_par_iter();
     let marks: Result<Vec<Marks>, Interrupted> = places
+        .with_min_len(fluxform_base::progress::items_a_task(points.len()))
         .map(|row| {
             if row % MARKED_BETWEEN_LOOKS == 0 {
                 progress.check()?;

@@ -149,6 +149,7 @@ impl Surface {
                 let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
                 let points = (0..grid.len()).into_par_iter();
                 Ok(points
+                    .with_min_len(fluxform_base::progress::items_a_task(grid.len()))
                     .map(|k| primitive.sample(x[k % x.len()], y[k / x.len()]))
                     .collect())
             }

@@ -390,6 +390,7 @@ impl<'a> Lattice<'a> {
         }
         let pairs: Vec<(u32, u32)> = (0..faces.list.len())
             .into_par_iter()
+            .with_min_len(progress::items_a_task(faces.list.len()))
             .flat_map_iter(|index| blocks.under(&faces.list[index], index))
             .collect();
         Self {
@@ -523,7 +524,10 @@ impl Blocks {
             let [columns, rows] = self.bounds(face);
             columns.len() * rows.len()
         };
-        faces.par_iter().map(touched).sum()
+        (faces.par_iter())
+            .with_min_len(progress::items_a_task(faces.len()))
+            .map(touched)
+            .sum()
     }
 
     /// The blocks over which a face lies, each with the face's index.
@@ -596,6 +600,7 @@ pub fn vertical_by_cell(
     progress.begin("deviation of cells", lattice.len() as u64);
     let cells = (0..lattice.len())
         .into_par_iter()
+        .with_min_len(progress::items_a_task(lattice.len()))
         .map(|cell| {
             if cell % CELLS_BETWEEN_LOOKS == 0 {
                 progress.check()?;

@@ -32,8 +32,10 @@ pub fn primitive_by_cell(
         to: nodes[at + 1],
         samples: 2,
     };
-    (0..columns * y.len().saturating_sub(1))
+    let cells = columns * y.len().saturating_sub(1);
+    (0..cells)
         .into_par_iter()
+        .with_min_len(fluxform_base::progress::items_a_task(cells))
         .map(|cell| {
             let (column, row) = (cell % columns, cell / columns);
             let node = row * x.len() + column;
