@@ -4,7 +4,7 @@
 //! at along vertical lines: one that lies below what such a line meets first is hidden.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::file_mesh::Triangle;
 use crate::height::{Grid, reach_m};
@@ -28,7 +28,7 @@ const LEVEL: f64 = 1e-6;
 const DEPTH: f64 = 1e-6;
 
 /// Shares of a surface's area, to about a hundredth.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hidden {
     /// Not seen from above: below other parts of the surface, or facing down as a body's underside.
     pub of_area: f64,

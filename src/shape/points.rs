@@ -157,6 +157,7 @@ impl Discretized {
                 marks: points.marks.clone(),
                 area_m2: points.area_m2.clone(),
                 fine: points.fine.clone(),
+                hidden: self.hidden,
             }),
         }
     }
@@ -167,16 +168,17 @@ impl Discretized {
 pub struct Known {
     /// As [`Discretized::certificate`].
     pub certificate: Option<Certificate>,
-    /// Flags and areas.
+    /// Flags, areas and what is hidden.
     pub marked: Option<Marked>,
 }
 
-/// Flags and areas of all points, as [`ConstraintPoints`] has them.
+/// Flags and areas of all points, as [`ConstraintPoints`] has them, and how much of the surface is hidden.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Marked {
     marks: Vec<Marks>,
     area_m2: Vec<f64>,
     fine: FineCells,
+    hidden: Option<Hidden>,
 }
 
 /// Options of discretising.
@@ -297,7 +299,9 @@ pub fn discretize_surface(
     let rounding_m = surface.coordinate_rounding_m();
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
+    let mut hidden = None;
     if let (true, Some(known)) = (settings.marks, &settings.known.marked) {
+        hidden = known.hidden;
         points.marks.clone_from(&known.marks);
         points.area_m2.clone_from(&known.area_m2);
         points.fine = known.fine.clone();
@@ -305,8 +309,8 @@ pub fn discretize_surface(
         let probe = Probe::new(surface, &points.grid);
         mark(&mut points, &probe, &found, progress)?;
         (points.area_m2, points.fine) = point_areas_m2(&points, &probe, progress)?;
+        hidden = Hidden::of(surface);
     }
-    let hidden = settings.marks.then(|| Hidden::of(surface)).flatten();
     if let Some(share) = hidden
         .map(|hidden| hidden.of_upward)
         .filter(|s| *s > MOST_HIDDEN)

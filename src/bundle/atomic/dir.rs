@@ -60,6 +60,24 @@ pub(crate) struct EntryStatus {
     mode: u32,
     owner: u32,
     group: u32,
+    /// When its content or what the system says of it changed last, ns.
+    changed_ns: i128,
+}
+
+/// What the system says of a file's content: another one after every change of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct FileVersion {
+    device: u64,
+    inode: u64,
+    bytes: u64,
+    changed_ns: i128,
+}
+
+impl FileVersion {
+    /// When it came to be by the file system's clock, ns since 1970.
+    pub fn changed_ns(self) -> i128 {
+        self.changed_ns
+    }
 }
 
 impl From<rustix::fs::Stat> for EntryStatus {
@@ -73,11 +91,30 @@ impl From<rustix::fs::Stat> for EntryStatus {
             mode: stat.st_mode & 0o7777,
             owner: stat.st_uid,
             group: stat.st_gid,
+            changed_ns: i128::from(stat.st_ctime) * 1_000_000_000 + i128::from(stat.st_ctime_nsec),
         }
     }
 }
 
 impl EntryStatus {
+    /// That of an open file.
+    ///
+    /// # Errors
+    /// The system's error.
+    pub fn of(file: &File) -> io::Result<Self> {
+        Ok(fstat(file)?.into())
+    }
+
+    /// Which content the file has.
+    pub fn version(&self) -> FileVersion {
+        FileVersion {
+            device: self.device,
+            inode: self.inode,
+            bytes: self.bytes,
+            changed_ns: self.changed_ns,
+        }
+    }
+
     /// Whether both are the same file or folder.
     pub fn is(&self, other: &Self) -> bool {
         (self.device, self.inode) == (other.device, other.inode)
@@ -244,7 +281,7 @@ impl Dir {
         // Without waiting for the other end of a pipe.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let file = File::from(openat(&self.fd, name.as_ref(), flags, Mode::empty())?);
-        if EntryStatus::from(fstat(&file)?).kind != Kind::File {
+        if EntryStatus::of(&file)?.kind != Kind::File {
             return Err(io::ErrorKind::InvalidInput.into());
         }
         Ok(file)

@@ -1,15 +1,17 @@
 //! How the program's own files are distinguished from the user's: records that list them with their digests.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ffi::OsStr;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::digest::hex;
-use super::dir::{Dir, Kind};
+use super::dir::{Dir, EntryStatus, FileVersion, Kind};
 use super::names::OLD;
 use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, parse_version};
 use crate::read_bounded::read_plain;
@@ -116,17 +118,42 @@ pub(super) fn unchanged(dir: &Dir, name: &OsStr, entry: &FileEntry) -> io::Resul
     Ok(digest(dir, name)? == entry.sha256)
 }
 
-/// The digest of the regular file `name` in `dir`.
+/// Digests of the files that were read in this run: what is replaced is looked at before a computation, before it is
+/// replaced and before it is removed.
+static DIGESTS: LazyLock<Mutex<HashMap<FileVersion, String>>> = LazyLock::new(Mutex::default);
+/// Digests that are held at most.
+const MOST_DIGESTS: usize = 10_000;
+/// A file that changed later than this before it was read may change again within the same tick of its file system's
+/// clock, so that nothing shows it, ns.
+const TICK_NS: i128 = 2_000_000_000;
+
+/// The digest of the regular file `name` in `dir`; that of a file that has not changed since is not computed again.
 pub(super) fn digest(dir: &Dir, name: &OsStr) -> io::Result<String> {
     let mut file = dir.file(name)?;
+    let known = || DIGESTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let version = EntryStatus::of(&file)?.version();
+    if let Some(digest) = known().get(&version) {
+        return Ok(digest.clone());
+    }
     let mut sha256 = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
     loop {
         match file.read(&mut buffer)? {
-            0 => return Ok(hex(&sha256.finalize())),
+            0 => break,
             count => sha256.update(&buffer[..count]),
         }
     }
+    let digest = hex(&sha256.finalize());
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let settled = now.is_ok_and(|now| version.changed_ns() + TICK_NS < now.as_nanos() as i128);
+    if settled && EntryStatus::of(&file)?.version() == version {
+        let mut known = known();
+        if known.len() >= MOST_DIGESTS {
+            known.clear();
+        }
+        known.insert(version, digest.clone());
+    }
+    Ok(digest)
 }
 
 /// The regular file `name` in `dir` as it is now.
@@ -213,4 +240,35 @@ fn bounded(dir: &Dir, name: impl AsRef<OsStr>) -> Option<Vec<u8>> {
     let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
     let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
     whole.then_some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As long as two changes may have the same time the file is read again, and later a change shows.
+    #[test]
+    fn a_file_that_changes_has_another_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let dir = Dir::open(folder.path()).unwrap();
+        let digest_of = |text: &str| {
+            std::fs::write(folder.path().join("a"), text).unwrap();
+            digest(&dir, OsStr::new("a")).unwrap()
+        };
+        let sha256 = |text: &str| crate::artefact::sha256_hex(text.as_bytes());
+        for text in ["one", "two", "one"] {
+            assert_eq!(digest_of(text), sha256(text));
+        }
+        std::thread::sleep(std::time::Duration::from_nanos(
+            TICK_NS as u64 + 100_000_000,
+        ));
+        let version = || {
+            let status = dir.status("a").unwrap().unwrap();
+            DIGESTS.lock().unwrap().get(&status.version()).cloned()
+        };
+        assert_eq!(version(), None);
+        assert_eq!(digest(&dir, OsStr::new("a")).unwrap(), sha256("one"));
+        assert_eq!(version(), Some(sha256("one")), "it is not read again");
+        assert_eq!(digest_of("two"), sha256("two"));
+    }
 }
