@@ -359,6 +359,22 @@ fn finish_counts(
     (finished, evaluations, false)
 }
 
+/// Arrays of each of so many choices while these are compared.
+fn compared_each(going: usize, settings: Settings) -> usize {
+    (settings.evaluations / (2 * going)).max(LEAST_EVALUATIONS)
+}
+
+/// Arrays of all of so many choices that are computed before one of them is searched to its end.
+#[must_use]
+pub fn compared(choices: usize, settings: Settings) -> usize {
+    let (mut going, mut all) = (choices, 0);
+    while going > 1 {
+        all += going * compared_each(going, settings);
+        going = going.div_ceil(2);
+    }
+    all
+}
+
 /// Searches all that are `going` with ever more evaluations until one is left; those left out, the worst first, the
 /// evaluations, and whether it was interrupted.
 fn halved<'a>(
@@ -372,7 +388,7 @@ fn halved<'a>(
     let mut interrupted = false;
     // The better half goes on with twice as many evaluations each.
     while going.len() > 1 && !interrupted {
-        let each = (settings.evaluations / (2 * going.len())).max(LEAST_EVALUATIONS);
+        let each = compared_each(going.len(), settings);
         for (index, search) in going.iter_mut() {
             let before = search.samples().len();
             search.allow(before + each);

@@ -455,7 +455,8 @@ impl Space {
     }
 
     /// Coils of the array.
-    pub(super) fn coils(&self) -> usize {
+    #[must_use]
+    pub fn coils(&self) -> usize {
         self.unit.len()
     }
 

@@ -183,8 +183,8 @@ fn regression_a_better_array_that_was_met_later_was_not_taken() {
         .expect("a design");
     let merit = |found: &Found<'_>| found.best.physical.merits[0];
     let before = merit(&found);
-    let mut wide = found.best.x.clone();
-    wide[0] = 32.0;
+    // Bore, layers, turns of a layer.
+    let wide = vec![32.5, 3.0, found.best.x[2]];
     found.search.allow(found.search.samples().len() + 1);
     found.search.evaluate(vec![wide]).expect("not interrupted");
     study(&mut found, &design).expect("not interrupted");

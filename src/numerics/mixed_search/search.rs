@@ -64,9 +64,8 @@ pub struct Sample {
 const BATCH: usize = 4;
 /// Designs about the given one before the first descent, beside one per variable.
 const NEAR_GIVEN: usize = 2;
-/// Designs over all ranges before the second, per variable and in all.
-const SPREAD_PER_VARIABLE: usize = 2;
-const SPREAD: usize = 6;
+/// Designs over all ranges before the second: what the surrogate promises far off teaches more than chance does.
+const SPREAD: usize = 4;
 /// Width of the first trust region, of that of a descent in the same valley, and of the widest.
 const FIRST_WIDTH: f64 = 0.3;
 const WIDEST: f64 = 0.6;
@@ -84,6 +83,8 @@ const GOOD: f64 = 0.5;
 const POOR: f64 = 0.05;
 /// Places nearer to a sample than this share of the trust region teach nothing.
 const NEAR: f64 = 0.02;
+/// Places from which the surrogate's best over all ranges is looked for.
+const FAR_STARTS: usize = 4;
 /// Places among which the one farthest from all samples is chosen.
 const SCATTERED: usize = 40;
 /// Merit that is not worth a step.
@@ -183,7 +184,6 @@ impl<'a> Search<'a> {
             self.scatter(&near, FIRST_WIDTH, size + NEAR_GIVEN)?;
         }
         let everywhere = vec![0.5; size];
-        let spread = SPREAD + SPREAD_PER_VARIABLE * size;
         if !self.spread {
             // What lies near the given design is known soon; the next descent is one far from there.
             if let Some(center) = self.start(0).filter(|_| !self.spent()) {
@@ -191,7 +191,7 @@ impl<'a> Search<'a> {
                 self.near_given = Some(end);
             }
             self.spread = true;
-            self.scatter(&everywhere, 1.0, self.samples.len() + spread)?;
+            self.scatter(&everywhere, 1.0, self.samples.len() + SPREAD)?;
         }
         for start in self.ends.len()..self.settings.starts {
             if self.spent() {
@@ -369,10 +369,7 @@ impl<'a> Search<'a> {
             }
             // One far off, where the surrogate promises most.
             if width > 0.1 * FIRST_WIDTH {
-                let everywhere = (vec![0.0; at.len()], vec![1.0; at.len()]);
-                let from = self.random_place(&everywhere);
-                let far = self.climb(&surrogate, &from, &everywhere);
-                batch.extend(far.filter(|far| far.judged.merit() > now).map(|far| far.u));
+                batch.extend(self.far(&surrogate, now));
             }
             let mut batch = self.new_places(batch, NEAR * width);
             let others = self.scattered(&at, width, BATCH - batch.len());
@@ -403,6 +400,21 @@ impl<'a> Search<'a> {
             }
         }
         Ok(self.samples[center].x.clone())
+    }
+
+    /// Where climbs from places drawn over all ranges end that the surrogate promises most of, above `now`.
+    fn far(&mut self, surrogate: &Surrogate, now: f64) -> Option<Vec<f64>> {
+        let size = self.problem.variables().len();
+        let everywhere = (vec![0.0; size], vec![1.0; size]);
+        let starts: Vec<_> = (0..FAR_STARTS)
+            .map(|_| self.random_place(&everywhere))
+            .collect();
+        let ends = starts
+            .iter()
+            .filter_map(|from| self.climb(surrogate, from, &everywhere));
+        let promised = ends.map(|end| (end.judged.merit(), end.u));
+        let best = promised.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        best.filter(|(merit, _)| *merit > now).map(|(_, u)| u)
     }
 
     /// The surrogate of all outputs.

@@ -1,5 +1,7 @@
 //! `optimize --for`: arguments, files and the summary.
 
+use std::collections::BTreeMap;
+
 use clap::Args;
 
 use super::physics::{Aim, ArrayPhysics, Constant, Journal};
@@ -15,6 +17,8 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::problem::Level;
+use crate::coil::array_search::search::compared;
+use crate::coil::array_search::space::{Space, choices};
 use crate::coil::array_search::study::Effort;
 use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
@@ -22,6 +26,7 @@ use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Progress};
+use crate::scene::cost;
 
 /// An array for shapes instead of a coil.
 #[derive(Debug, Args)]
@@ -335,20 +340,43 @@ fn vary(text: &str) -> Result<(String, toml::Value), String> {
     Ok((axis.key, toml::Value::Array(values)))
 }
 
-/// The computation that follows, stated first.
+/// The computation that follows, stated first: every number of coils where each is searched to its end, else the
+/// costliest of them.
 fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
-    let steel = crate::scene::cost::of_steel(design, physics.tolerance(Level::Search, design));
-    let seconds: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();
-    let each = seconds
-        + physics.count(Level::Search) as f64
-            * design.array.positions_m.len() as f64
-            * crate::scene::cost::STEEL_POINT_COIL_S;
-    let evaluations = request.settings.evaluations;
-    let more = Effort::of(request.every_count).evaluations;
+    let choices = choices(design, &design.search);
+    let spaces = choices
+        .iter()
+        .filter_map(|choice| Space::new(design, &design.search, choice).ok());
+    let cpu_s = |space: Space| {
+        let array = space.design(&space.given(design));
+        let steel = cost::of_steel(&array, physics.tolerance(Level::Search, &array));
+        let forces = physics.count(Level::Search) * space.coils();
+        let steel_s: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();
+        (
+            space.coils(),
+            steel_s + forces as f64 * cost::STEEL_POINT_COIL_S,
+        )
+    };
+    let mut each_cpu_s = BTreeMap::new();
+    for (coils, cpu_s) in spaces.map(cpu_s) {
+        let known: &mut f64 = each_cpu_s.entry(coils).or_default();
+        *known = known.max(cpu_s);
+    }
+    let costliest = each_cpu_s.values().copied().fold(0.0, f64::max);
+    let (ends, ends_cpu_s) = match request.every_count {
+        true => (each_cpu_s.len(), each_cpu_s.values().sum()),
+        false => (1, costliest),
+    };
+    let compared = compared(choices.len(), request.settings);
+    let (searched, around) = (
+        request.settings.evaluations,
+        Effort::of(request.every_count).evaluations,
+    );
     format!(
-        "computes {evaluations} arrays at most and {more} about the best, about {:.0} CPU s; Ctrl-C gives \
-         the best so far",
-        (each * (evaluations + more) as f64).ceil()
+        "computes up to {} arrays and about {} around the best, about {:.0} CPU s; Ctrl-C gives the best so far",
+        compared + ends * searched,
+        ends * around,
+        (compared as f64 * costliest + (searched + around) as f64 * ends_cpu_s).ceil()
     )
 }
 
