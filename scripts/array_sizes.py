@@ -63,7 +63,7 @@ def row(program, folder, options, case):
     vary += ["--vary", f"array.rows={count}", "--vary", f"array.columns={count}"]
     shapes = [str(ROOT / f"shapes/{shape}.toml") for shape in options.shapes]
     found, _, seconds = run(program, "optimize", str(design), "--for", *shapes, *vary, "--constant", constant,
-                            "--evaluations", str(options.evaluations), "--out", str(best))
+                            "--evaluations", str(options.evaluations), "--seed", str(options.seed), "--out", str(best))
     checked, code, _ = run(program, "evaluate", str(best), "--strict")
     settling = checked["limits"]["array_settling_s"]["value"]
     cells = [f"{count} x {count}", driver, constant, f"{found['gain']:.3f}"]
@@ -76,6 +76,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
     parser.add_argument("--evaluations", type=int, default=160)
+    parser.add_argument("--seed", type=int, default=1, help="of the searches")
     parser.add_argument("--short", action="store_true")
     options = parser.parse_args()
     rows, options.shapes = ROWS, SHAPES
