@@ -21,9 +21,10 @@ pub use super::array_resolution::ArrayResolution;
 use super::array_resolution::SOLVER_SHARE;
 use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
-use super::coupling::{Coupling, different_offsets};
+use super::coupling::Coupling;
 use super::equivalent_dipoles::{ArraySources, Near};
 use super::generatrix::Generatrix;
+use super::offsets::Offsets;
 use super::reduced_coupling::{BLOCK, Joined, OneCore, Received, ReducedCoupling, SolvedBlock};
 use super::response::{Response, Rings};
 use super::symmetry::{Motion, motions};
@@ -156,10 +157,10 @@ impl CoupledArray {
         let mut own = DMatrix::zeros(size, columns);
         let own_moments = self.response.on_grid(&self.own_layer);
         for (place, drive) in drives.iter().enumerate() {
-            for core in (0..cores).filter(|c| c != drive) {
-                sent.column_mut(place * cores + core)
-                    .copy_from_slice(&coupling.winding(core, *drive).potential);
-            }
+            let mut current_a = vec![0.0; cores];
+            current_a[*drive] = 1.0;
+            let mut of_drive = sent.columns_mut(place * cores, cores);
+            of_drive.copy_from(&coupling.of_windings(&current_a));
             own.set_column(place * cores + drive, &own_moments);
         }
         let solved = coupling.solve(sent, &own, resolution.residual);
@@ -182,8 +183,9 @@ impl CoupledArray {
             let moved = |from: &DMatrix<f64>| -> Vec<Vec<f64>> {
                 let mut out = vec![Vec::new(); cores];
                 for core in 0..cores {
+                    let values = from.column(place * cores + core);
                     out[motion.coil[core]] =
-                        self.moved(motion, from.column(place * cores + core).as_slice());
+                        motion.image_on_grid(self.response.angles, values.as_slice());
                 }
                 out
             };
@@ -197,13 +199,14 @@ impl CoupledArray {
         let by_ring = self.response.layers[0].tr_mul(&weights);
         let rings = self.response.exchange.rings.len();
         for (drive, (potentials, moments)) in all.iter().enumerate() {
+            let of_others_wb = coupling.flux_of_others_wb(|core| &moments[core]);
             for (coil, at_coil) in potentials.iter().enumerate() {
                 let mut flux = if coil == drive { own_flux } else { 0.0 };
                 for values in at_coil.chunks(rings) {
                     let share: f64 = values.iter().zip(by_ring.iter()).map(|(a, b)| a * b).sum();
                     flux += share / self.response.angles as f64;
                 }
-                flux += coupling.flux_of_others_wb(coil, |core| &moments[core]);
+                flux += of_others_wb[coil];
                 self.added_inductance_h[(coil, drive)] = flux;
             }
         }
@@ -245,16 +248,6 @@ impl CoupledArray {
         self.relative_residual = solved.relative_residual;
         self.iterations = solved.iterations;
         self.potentials = Potentials::Reduced(solved.received);
-    }
-
-    fn moved(&self, motion: &Motion, values: &[f64]) -> Vec<f64> {
-        let rings = self.response.exchange.rings.len();
-        let mut out = vec![0.0; values.len()];
-        for (k, block) in values.chunks(rings).enumerate() {
-            let to = motion.angle(k, self.response.angles);
-            out[to * rings..(to + 1) * rings].copy_from_slice(block);
-        }
-        out
     }
 
     /// Azimuthal modes, as [`Response::modes_of`] has them, of what one core receives with currents in
@@ -385,7 +378,7 @@ pub(super) fn grids_at_once(positions_m: &[[f64; 2]]) -> usize {
     if positions_m.len() > MOST_WHOLE {
         0
     } else {
-        different_offsets(positions_m)
+        Offsets::of_pairs(positions_m).count()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::CoreShape;
 use super::array::{ArrayResolution, grids_at_once, representatives};
-use super::coupling::different_offsets;
+use super::offsets::Offsets;
 use super::reduced_coupling::is_lattice;
 use super::symmetry::motions;
 
@@ -120,7 +120,7 @@ impl ArrayCost {
         let cores = positions_m.len() as f64;
         let size = sent * cores;
         let offsets = if positions_m.len() <= COUNTED {
-            different_offsets(positions_m) as f64
+            Offsets::of_pairs(positions_m).count() as f64
         } else {
             cores
         };

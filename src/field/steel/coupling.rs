@@ -1,12 +1,12 @@
 //! The field of sources on the exchange grid of a core some way off, and the cores of an array
 //! coupled by it.
 
-use nalgebra::{DMatrix, DMatrixViewMut, Dyn};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use super::exchange::LEAST_GAP;
+use super::offsets::Offsets;
 use super::response::{Response, Ring};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -36,15 +36,26 @@ pub struct Sent {
 #[derive(Debug)]
 pub struct Coupling {
     cores: usize,
-    links: Links,
+    offsets: Offsets,
+    /// The pairs at every offset and its images, receivers ascending.
+    pairs: Vec<Vec<Pair>>,
     /// Potentials at the receiver for moments of the sender, for every offset.
     blocks: Vec<DMatrix<f64>>,
     /// Of the sender's winding at the receiver, for every offset.
     windings: Vec<Sent>,
     /// One core's moments for potentials on its grid.
     response: DMatrix<f64>,
-    /// Angle between two of the grid's, rad.
-    turn: f64,
+    /// Angles of the grid.
+    angles: usize,
+}
+
+/// Two cores, one of which hears the other.
+#[derive(Debug)]
+struct Pair {
+    receiver: usize,
+    sender: usize,
+    /// The number of the motion that takes the pairs' offset to theirs.
+    motion: usize,
 }
 
 /// A solved coupling; columns as in the problem's.
@@ -73,49 +84,57 @@ impl Coupling {
         tolerance: f64,
     ) -> Self {
         let points = grid_points(response);
-        let links = Links::new(positions_m);
-        let blocks = links
-            .offsets_m
-            .par_iter()
+        let offsets = Offsets::of_pairs(positions_m);
+        let blocks = (offsets.first_m.par_iter())
             .map(|offset| between_cores(&points, response, *offset))
             .collect();
-        let windings = links
-            .offsets_m
-            .par_iter()
+        let windings = (offsets.first_m.par_iter())
             .map(|offset| from_winding(winding, &points, *offset, tolerance))
             .collect();
+        let cores = positions_m.len();
+        let mut pairs: Vec<Vec<Pair>> = offsets.first_m.iter().map(|_| Vec::new()).collect();
+        for receiver in 0..cores {
+            for sender in (0..cores).filter(|sender| *sender != receiver) {
+                let (a, b) = (positions_m[receiver], positions_m[sender]);
+                let (number, motion) = offsets
+                    .of([a[0] - b[0], a[1] - b[1]])
+                    .expect("cores are apart, and their offset is one of all pairs'");
+                pairs[number].push(Pair {
+                    receiver,
+                    sender,
+                    motion,
+                });
+            }
+        }
         Self {
-            cores: positions_m.len(),
-            links,
+            cores,
+            offsets,
+            pairs,
             blocks,
             windings,
             response: response.matrix(),
-            turn: TAU / response.angles as f64,
+            angles: response.angles,
         }
     }
 
-    /// The field of the winding of coil `sender` at the core of another, `receiver`.
+    /// Potentials at every core's grid of the windings of all others with `currents_a`, A.
     #[must_use]
-    pub fn winding(&self, receiver: usize, sender: usize) -> &Sent {
-        &self.windings[self.links.index[receiver * self.cores + sender]]
-    }
-
-    /// Potentials at every core's grid, of `size` points, of the windings of all others with
-    /// `currents_a`, A.
-    #[must_use]
-    pub(crate) fn of_windings(&self, currents_a: &[f64], size: usize) -> DMatrix<f64> {
-        let mut sum = DMatrix::zeros(size, self.cores);
-        for (receiver, mut column) in sum.column_iter_mut().enumerate() {
-            for (sender, current_a) in currents_a.iter().enumerate() {
-                if sender != receiver {
-                    let sent = &self.winding(receiver, sender).potential;
-                    for (value, potential) in column.iter_mut().zip(sent) {
-                        *value += current_a * potential;
-                    }
-                }
+    pub fn of_windings(&self, currents_a: &[f64]) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(self.response.nrows(), self.cores);
+        for (pairs, sent) in self.pairs.iter().zip(&self.windings) {
+            for pair in pairs {
+                let mut column = sum.column_mut(pair.receiver);
+                let image = self.image(pair, &sent.potential);
+                column.axpy(currents_a[pair.sender], &image, 1.0);
             }
         }
         sum
+    }
+
+    /// Of values on the receiver's grid where the sender is at the pair's offset, those where it is.
+    fn image(&self, pair: &Pair, values: &[f64]) -> DVector<f64> {
+        let motion = &self.offsets.motions[pair.motion];
+        DVector::from_vec(motion.image_on_grid(self.angles, values))
     }
 
     /// Solves q - T K q = T p + q_own: `sent` are the potentials p of the other coils' windings,
@@ -142,16 +161,19 @@ impl Coupling {
         }
     }
 
-    /// Flux through a coil of all cores but its own, Wb, `moments(core)` being theirs.
+    /// Flux through every coil of all cores but its own, Wb, `moments(core)` being theirs.
     #[must_use]
-    pub fn flux_of_others_wb<'a>(&self, coil: usize, moments: impl Fn(usize) -> &'a [f64]) -> f64 {
-        let mut flux = 0.0;
-        for core in (0..self.cores).filter(|c| *c != coil) {
-            let normal = &self.winding(core, coil).normal_field_t;
-            let sum: f64 = moments(core).iter().zip(normal).map(|(q, b)| q * b).sum();
-            flux -= self.turn * sum;
+    pub fn flux_of_others_wb<'a>(&self, moments: impl Fn(usize) -> &'a [f64]) -> Vec<f64> {
+        let mut flux_wb = vec![0.0; self.cores];
+        let turn = TAU / self.angles as f64;
+        for (pairs, sent) in self.pairs.iter().zip(&self.windings) {
+            for pair in pairs {
+                let normal = self.image(pair, &sent.normal_field_t);
+                let both = moments(pair.receiver).iter().zip(normal.iter());
+                flux_wb[pair.sender] -= turn * both.map(|(q, b)| q * b).sum::<f64>();
+            }
         }
-        flux
+        flux_wb
     }
 
     /// Potentials at every core of the moments of all others; columns as in `moments`.
@@ -159,16 +181,21 @@ impl Coupling {
         let cores = self.cores;
         let problems = moments.ncols() / cores.max(1);
         let size = moments.nrows();
+        let starts: Vec<usize> = (0..size).step_by(ROWS).collect();
         let mut received = DMatrix::zeros(size, moments.ncols());
-        // Pairs that share an offset share a product: a matrix is read once for all of them. Offsets
+        // Pairs at images of an offset share a product: a matrix is read once for all of them. Offsets
         // are added in order, whatever the threads.
-        for (block, pairs) in self.blocks.iter().zip(&self.links.pairs) {
+        for (block, pairs) in self.blocks.iter().zip(&self.pairs) {
             for pairs in pairs.chunks(PAIRS) {
-                let column = |k: usize, core: usize| k / pairs.len() * cores + core;
-                let from = DMatrix::from_fn(size, pairs.len() * problems, |i, k| {
-                    moments[(i, column(k, pairs[k % pairs.len()].sender))]
+                let columns = || {
+                    let firsts = (0..problems).map(|problem| problem * cores);
+                    firsts.flat_map(|first| pairs.iter().map(move |pair| (first, pair)))
+                };
+                let sent = columns().flat_map(|(first, pair)| {
+                    let sent = &moments.as_slice()[(first + pair.sender) * size..][..size];
+                    self.offsets.motions[pair.motion].before_on_grid(self.angles, sent)
                 });
-                let starts: Vec<usize> = (0..size).step_by(ROWS).collect();
+                let from = DMatrix::from_iterator(size, pairs.len() * problems, sent);
                 let products: Vec<DMatrix<f64>> = starts
                     .par_iter()
                     .map(|start| {
@@ -176,12 +203,14 @@ impl Coupling {
                         block.rows(*start, ROWS.min(size - start)) * &from
                     })
                     .collect();
-                for (start, product) in starts.iter().zip(&products) {
-                    for (k, part) in product.column_iter().enumerate() {
-                        let to = column(k, pairs[k % pairs.len()].receiver);
-                        let mut rows = received.view_mut((*start, to), (part.len(), 1));
-                        rows += part;
-                    }
+                for (k, (first, pair)) in columns().enumerate() {
+                    let rows = products.iter().flat_map(|part| {
+                        let rows = part.nrows();
+                        &part.as_slice()[k * rows..][..rows]
+                    });
+                    let product: Vec<f64> = rows.copied().collect();
+                    let mut column = received.column_mut(first + pair.receiver);
+                    column += self.image(pair, &product);
                 }
             }
         }
@@ -394,84 +423,81 @@ pub(super) fn from_winding(
     }
 }
 
-/// Number of different offsets between cores: each has a matrix.
-pub(super) fn different_offsets(positions_m: &[[f64; 2]]) -> usize {
-    Links::new(positions_m).offsets_m.len()
-}
-
-/// The pairs of cores by their offset: many share one.
-#[derive(Debug)]
-pub(super) struct Links {
-    /// Of the receiver from the sender, m.
-    pub(super) offsets_m: Vec<[f64; 2]>,
-    /// [receiver, sender]; meaningless on the diagonal.
-    pub(super) index: Vec<usize>,
-    /// The pairs of every offset, receivers ascending.
-    pairs: Vec<Vec<Pair>>,
-}
-
-/// Two cores, one of which hears the other.
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    receiver: usize,
-    sender: usize,
-}
-
-impl Links {
-    pub(super) fn new(positions_m: &[[f64; 2]]) -> Self {
-        let cores = positions_m.len();
-        let mut offsets_m: Vec<[f64; 2]> = Vec::new();
-        let mut index = vec![usize::MAX; cores * cores];
-        let extent = positions_m
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |e, x| e.max(x.abs()));
-        // Positions from a grid differ by rounding only: known offsets are found by their cell in a
-        // lattice that is coarse against that, or by a cell beside it.
-        let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * extent;
-        let cell = |x: f64| (x / (1e-9 * extent.max(f64::MIN_POSITIVE))).round() as i64;
-        let mut cells: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-        let mut pairs: Vec<Vec<Pair>> = Vec::new();
-        for receiver in 0..cores {
-            for sender in (0..cores).filter(|s| *s != receiver) {
-                let (a, b) = (positions_m[receiver], positions_m[sender]);
-                let offset = [a[0] - b[0], a[1] - b[1]];
-                let at = offset.map(cell);
-                let known = (0..9)
-                    .filter_map(|k| cells.get(&[at[0] + k % 3 - 1, at[1] + k / 3 - 1]))
-                    .flatten()
-                    .filter(|k| (0..2).all(|axis| same(offsets_m[**k][axis], offset[axis])))
-                    .min()
-                    .copied();
-                let number = known.unwrap_or_else(|| {
-                    offsets_m.push(offset);
-                    pairs.push(Vec::new());
-                    cells.entry(at).or_default().push(offsets_m.len() - 1);
-                    offsets_m.len() - 1
-                });
-                index[receiver * cores + sender] = number;
-                pairs[number].push(Pair { receiver, sender });
-            }
-        }
-        Self {
-            offsets_m,
-            index,
-            pairs,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::different_offsets;
+    use super::*;
+    use crate::steel::CoreShape;
+    use crate::steel::array::ArrayResolution;
+    use crate::steel::generatrix::Generatrix;
+    use crate::steel::response::Rings;
 
+    /// In every eighth of the plane, on its edges, and within rounding of each other.
     #[test]
-    fn cores_on_a_grid_share_their_offsets() {
-        assert_eq!(different_offsets(&[[0.7, 1.3]]), 0);
-        // One apart and two apart, to either side; the last within rounding.
-        let row = [[0.1, 0.0], [0.2, 0.0], [0.1 + 0.2, 0.0]];
-        assert_eq!(different_offsets(&row), 4);
-        let square = [[0.0, 0.0], [1.3, 0.0], [0.0, 1.3], [1.3, 1.3]];
-        assert_eq!(different_offsets(&square), 8);
+    fn what_images_of_an_offset_pass_is_what_each_pair_does() {
+        let winding = Winding {
+            inner_radius_m: 0.013,
+            outer_radius_m: 0.019,
+            length_m: 0.03,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.011,
+            bottom_m: -0.035,
+            top_m: 0.003,
+        };
+        let resolution = ArrayResolution::for_tolerance(1e-2, shape, 0.04);
+        let outline = Generatrix::of_coil(&winding, shape, &resolution.outline);
+        let exchange = Rings::new(&outline, 4, |_| 0.02);
+        let response = Response::new(outline, exchange, 12, 4, 470.0, 1e-6);
+        let points = grid_points(&response);
+        let positions_m = [
+            [0.0, 0.0],
+            [0.04, 0.0],
+            [0.1, 0.0],
+            [0.04, 0.06],
+            [0.1, 0.06 + 1e-17],
+            [-0.03, 0.05],
+        ];
+        let coupling = Coupling::new(&winding, &positions_m, &response, 1e-8);
+        assert!(coupling.blocks.len() < 15);
+        let (size, cores) = (points.len(), positions_m.len());
+        let moments = DMatrix::from_fn(size, 2 * cores, |i, k| (0.1 + (i * (k + 3)) as f64).sin());
+        let currents_a = [0.7, -1.3, 0.2, 1.9, -0.4, 1.1];
+        let (mut received, mut of_windings) =
+            (DMatrix::zeros(size, 2 * cores), DMatrix::zeros(size, cores));
+        let mut flux_wb = vec![0.0; cores];
+        for (to, a) in positions_m.iter().enumerate() {
+            for (from, b) in positions_m
+                .iter()
+                .enumerate()
+                .filter(|(from, _)| *from != to)
+            {
+                let offset_m = [a[0] - b[0], a[1] - b[1]];
+                let block = between_cores(&points, &response, offset_m);
+                for problem in [0, cores] {
+                    let mut column = received.column_mut(problem + to);
+                    column += &block * moments.column(problem + from);
+                }
+                let sent = from_winding(&winding, &points, offset_m, 1e-8);
+                let mut column = of_windings.column_mut(to);
+                column += currents_a[from] * DVector::from_vec(sent.potential);
+                let normal = DVector::from_vec(sent.normal_field_t);
+                flux_wb[from] -= TAU / 12.0 * normal.dot(&moments.column(to));
+            }
+        }
+        let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+            assert!(
+                (a - b).amax() < 1e-12 * b.amax(),
+                "{:e}",
+                (a - b).amax() / b.amax()
+            );
+        };
+        close(&coupling.send(&moments), &received);
+        close(&coupling.of_windings(&currents_a), &of_windings);
+        let flux = coupling.flux_of_others_wb(|core| &moments.as_slice()[core * size..][..size]);
+        close(
+            &DMatrix::from_vec(cores, 1, flux),
+            &DMatrix::from_vec(cores, 1, flux_wb),
+        );
     }
 }

@@ -23,6 +23,7 @@ pub mod generatrix;
 pub mod layer_gradient;
 pub mod lobatto;
 pub mod magnetized;
+mod offsets;
 pub mod passive;
 mod peak_search;
 pub mod permeability;

@@ -20,8 +20,9 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::coupling::{GridPoint, Sent, between_cores, from_winding, grid_points};
+use super::offsets::{Offsets, ROUNDING, extent_m};
 use super::response::Response;
-use super::symmetry::{Motion, motions};
+use super::symmetry::Motion;
 use crate::winding::Winding;
 use fluxform_numerics::block_toeplitz::BlockToeplitz;
 use fluxform_numerics::bounded_svd::svd;
@@ -37,8 +38,6 @@ pub(super) const BLOCK: usize = 10;
 const DISTANCES: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Cells of a lattice for every core on it, at most, for which transforms pay.
 const MOST_CELLS: usize = 4;
-/// Difference of lengths that are one but for rounding, in units of the array's extent.
-const ROUNDING: f64 = 1e-10;
 
 /// A potential, or moments, on a core's exchange grid that are one azimuthal wave.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -215,14 +214,10 @@ struct Passed {
     own_flux_wb: f64,
 }
 
-/// The cores' places: offsets that occur, by steps of a lattice or by pairs.
+/// The cores' places: cells and steps of a lattice, m, where they are on one, and the offsets that occur.
 struct Layout {
-    /// Cells and the lattice's steps, m.
     lattice: Option<(Vec<[usize; 2]>, [f64; 2])>,
-    /// Offsets in the first eighth of the plane, m.
-    offsets_m: Vec<[f64; 2]>,
-    /// All motions of a single coil.
-    motions: Vec<Motion>,
+    offsets: Offsets,
 }
 
 /// The cells of places on a lattice that they fill to a good part, and its steps, m.
@@ -262,95 +257,15 @@ pub(super) fn is_lattice(positions_m: &[[f64; 2]]) -> bool {
     lattice(positions_m).is_some()
 }
 
-fn extent_m(positions_m: &[[f64; 2]]) -> f64 {
-    let span = |axis: usize| {
-        let values = positions_m.iter().map(|p| p[axis]);
-        let [lo, hi] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
-            [lo.min(v), hi.max(v)]
-        });
-        hi - lo
-    };
-    span(0).hypot(span(1))
-}
-
 impl Layout {
     fn new(positions_m: &[[f64; 2]]) -> Self {
         let lattice = lattice(positions_m);
-        let extent = extent_m(positions_m);
-        let mut offsets_m: Vec<[f64; 2]> = match &lattice {
-            Some((cells, step)) => {
-                let mut steps: Vec<[usize; 2]> = (cells.iter())
-                    .flat_map(|a| {
-                        cells
-                            .iter()
-                            .map(|b| [0, 1].map(|axis| a[axis].abs_diff(b[axis])))
-                    })
-                    .collect();
-                steps.sort_unstable();
-                steps.dedup();
-                steps
-                    .iter()
-                    .map(|s| [s[0] as f64 * step[0], s[1] as f64 * step[1]])
-                    .collect()
-            }
-            None => (positions_m.iter().enumerate())
-                .flat_map(|(i, a)| {
-                    (positions_m[..i].iter()).map(move |b| [a[0] - b[0], a[1] - b[1]])
-                })
-                .collect(),
+        let offsets = match &lattice {
+            Some((cells, step_m)) => Offsets::on_lattice(cells, *step_m),
+            None => Offsets::of_pairs(positions_m),
         };
-        for offset in &mut offsets_m {
-            *offset = first_eighth(*offset);
-        }
-        offsets_m.retain(|[x, _]| *x > ROUNDING * extent);
-        offsets_m.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-        let same =
-            |a: &[f64; 2], b: &[f64; 2]| (0..2).all(|k| (a[k] - b[k]).abs() <= ROUNDING * extent);
-        // Those that differ by rounding only may not lie side by side.
-        let mut distinct: Vec<[f64; 2]> = Vec::with_capacity(offsets_m.len());
-        for offset in offsets_m {
-            let near = distinct.iter().rev();
-            let mut near = near.take_while(|known| offset[0] - known[0] <= ROUNDING * extent);
-            if !near.any(|known| same(known, &offset)) {
-                distinct.push(offset);
-            }
-        }
-        Self {
-            lattice,
-            offsets_m: distinct,
-            motions: motions(&[[0.0; 2]]),
-        }
+        Self { lattice, offsets }
     }
-
-    /// The offset in the first eighth that stands for `offset_m`, and the motion that takes it there.
-    fn of(&self, offset_m: [f64; 2]) -> Option<(usize, &Motion)> {
-        let [x, y] = first_eighth(offset_m);
-        let near = |[a, b]: [f64; 2]| (a - x).abs() + (b - y).abs();
-        let at = self
-            .offsets_m
-            .partition_point(|known| known[0] < x * (1.0 - 1e-8));
-        let reach = self.offsets_m[at..]
-            .iter()
-            .take_while(|known| known[0] <= x * (1.0 + 1e-8));
-        let (place, known) = reach
-            .enumerate()
-            .min_by(|(_, a), (_, b)| near(**a).total_cmp(&near(**b)))?;
-        let size = offset_m[0].hypot(offset_m[1]);
-        (near(*known) <= 1e-8 * size).then_some(())?;
-        let motion = self.motions.iter().min_by(|a, b| {
-            let off = |motion: &Motion| {
-                let image = motion.image(*known);
-                (image[0] - offset_m[0]).abs() + (image[1] - offset_m[1]).abs()
-            };
-            off(a).total_cmp(&off(b))
-        })?;
-        Some((at + place, motion))
-    }
-}
-
-/// The image of an offset between the first axis and the diagonal.
-fn first_eighth([x, y]: [f64; 2]) -> [f64; 2] {
-    [x.abs().max(y.abs()), x.abs().min(y.abs())]
 }
 
 /// How the exchange is applied to all cores.
@@ -575,7 +490,7 @@ impl<'a> ReducedCoupling<'a> {
             passed: Vec::new(),
             exchange: Exchange::Pairs,
         };
-        coupling.passed = (coupling.layout.offsets_m.par_iter())
+        coupling.passed = (coupling.layout.offsets.first_m.par_iter())
             .map(|offset_m| coupling.passed_at(core, &points, &responses, *offset_m, cut))
             .collect();
         coupling.exchange = coupling.exchange();
@@ -613,10 +528,14 @@ impl<'a> ReducedCoupling<'a> {
         }
     }
 
+    fn motion(&self, number: usize) -> &Motion {
+        &self.layout.offsets.motions[number]
+    }
+
     /// The block for a receiver at `offset_m` from the sender, into `block`.
     fn put_block(&self, offset_m: [f64; 2], block: &mut DMatrix<f64>) {
-        if let Some((number, motion)) = self.layout.of(offset_m) {
-            let first = &self.passed[number].block;
+        if let Some((number, motion)) = self.layout.offsets.of(offset_m) {
+            let (first, motion) = (&self.passed[number].block, self.motion(motion));
             let rows = turned(&self.received.waves, motion, first);
             let both = turned(&self.felt.waves, motion, &rows.transpose()).transpose();
             block.view_mut((0, 0), both.shape()).copy_from(&both);
@@ -625,8 +544,9 @@ impl<'a> ReducedCoupling<'a> {
 
     /// Flux through a coil at the origin for coefficients at a core at `offset_m`, [1, received].
     fn put_flux(&self, offset_m: [f64; 2], block: &mut DMatrix<f64>) {
-        if let Some((number, motion)) = self.layout.of(offset_m) {
-            let flux = turned(&self.received.waves, motion, &self.passed[number].flux);
+        if let Some((number, motion)) = self.layout.offsets.of(offset_m) {
+            let (flux, motion) = (&self.passed[number].flux, self.motion(motion));
+            let flux = turned(&self.received.waves, motion, flux);
             block.copy_from(&flux.transpose());
         }
     }
@@ -729,7 +649,7 @@ impl<'a> ReducedCoupling<'a> {
             for coil in 0..cores {
                 let [from, to] = [coil, *drive].map(|at| self.positions_m[at]);
                 let offset_m = [to[0] - from[0], to[1] - from[1]];
-                let driven = self.layout.of(offset_m);
+                let driven = self.layout.offsets.of(offset_m);
                 flux_wb[(coil, column)] += self.flux.dot(&of_drive.column(coil))
                     + driven.map_or(0.0, |(number, _)| self.passed[number].own_flux_wb);
             }
@@ -755,9 +675,9 @@ impl<'a> ReducedCoupling<'a> {
             let from = self.positions_m[*drive];
             for (core, at) in self.positions_m.iter().enumerate() {
                 let offset_m = [at[0] - from[0], at[1] - from[1]];
-                if let Some((number, motion)) = self.layout.of(offset_m) {
-                    let winding =
-                        turned(&self.received.waves, motion, &self.passed[number].winding);
+                if let Some((number, motion)) = self.layout.offsets.of(offset_m) {
+                    let (winding, motion) = (&self.passed[number].winding, self.motion(motion));
+                    let winding = turned(&self.received.waves, motion, winding);
                     windings
                         .view_mut((core * rows, column), (rows, 1))
                         .copy_from(&winding);

@@ -24,10 +24,11 @@ use super::CoreShape;
 use super::array::{ArrayResolution, closest_m};
 use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
-use super::coupling::{Coupling, different_offsets};
+use super::coupling::Coupling;
 use super::curve_refinement::{AlongCurve, Level, Try, refined};
 use super::equivalent_dipoles::{ArraySources, Near};
 use super::generatrix::{Generatrix, Resolution};
+use super::offsets::Offsets;
 use super::permeability::Permeability;
 use super::response::{Response, Rings, mean};
 use super::saturated::{Convergence, CoreField, SaturatedCore, Solution};
@@ -266,7 +267,7 @@ impl SaturatedArray {
             response: &response,
             coupling: &coupling,
             own_layer: response.axial_layer(&setup.excitation.potential),
-            windings: coupling.of_windings(currents_a, response.size()),
+            windings: coupling.of_windings(currents_a),
             currents_a,
             alike: alike(positions_m, currents_a),
         };
@@ -282,14 +283,12 @@ impl SaturatedArray {
             .map(|solution| setup.core.field(solution, law))
             .collect();
         let weights = setup.excitation.flux_weights_wb_per_a(&setup.outline);
-        let flux_linkage_wb = (0..cores)
-            .map(|coil| {
-                weights.dot(&solved.layers_a[coil].column(0))
-                    + coupling.flux_of_others_wb(coil, |core| {
-                        let rows = solved.moments.nrows();
-                        &solved.moments.as_slice()[core * rows..(core + 1) * rows]
-                    })
-            })
+        let of_others_wb = coupling.flux_of_others_wb(|core| {
+            let rows = solved.moments.nrows();
+            &solved.moments.as_slice()[core * rows..(core + 1) * rows]
+        });
+        let flux_linkage_wb = (solved.layers_a.iter().zip(of_others_wb))
+            .map(|(layers, of_others_wb)| weights.dot(&layers.column(0)) + of_others_wb)
             .collect();
         Self {
             status: solved.status,
@@ -433,7 +432,7 @@ struct Sequence<'a, L> {
 impl<L: Permeability + Sync> Sequence<'_, L> {
     /// How finely the finest solution of a try is cut, but for its outline.
     fn finest(&self, aim: f64) -> ArrayResolution {
-        let offsets = different_offsets(self.positions_m);
+        let offsets = Offsets::of_pairs(self.positions_m).count();
         ArrayResolution::for_tolerance(aim, self.shape, closest_m(self.positions_m)).within_memory(
             self.shape,
             self.winding.length_m,

@@ -63,6 +63,25 @@ impl Motion {
         let k = if self.mirrored { angles - k } else { k };
         (k + self.quarters * (angles / 4)) % angles
     }
+
+    /// Values on a core's grid, as many side by side for every one of `angles`, after the motion.
+    #[must_use]
+    pub fn image_on_grid(&self, angles: usize, values: &[f64]) -> Vec<f64> {
+        let rings = values.len() / angles;
+        let mut image = vec![0.0; values.len()];
+        for (k, values) in values.chunks_exact(rings).enumerate() {
+            image[self.angle(k, angles) * rings..][..rings].copy_from_slice(values);
+        }
+        image
+    }
+
+    /// The inverse of [`Motion::image_on_grid`].
+    #[must_use]
+    pub fn before_on_grid(&self, angles: usize, image: &[f64]) -> Vec<f64> {
+        let rings = image.len() / angles;
+        let from = |k: usize| &image[self.angle(k, angles) * rings..][..rings];
+        (0..angles).flat_map(from).copied().collect()
+    }
 }
 
 /// The mean of the coils' places, m.

@@ -565,14 +565,11 @@ fn returned_flux_wb(
     );
     let places = [[0.0, 0.0], [0.041, 0.0286]];
     let coupling = Coupling::new(&winding, &places, &response, 1e-8);
-    let mut sent = DMatrix::zeros(response.size(), 2);
-    sent.column_mut(1)
-        .copy_from_slice(&coupling.winding(1, 0).potential);
     let own = DMatrix::zeros(response.size(), 2);
-    let solved = coupling.solve(sent, &own, 1e-10);
+    let solved = coupling.solve(coupling.of_windings(&[1.0, 0.0]), &own, 1e-10);
     let moments =
         |core: usize| &solved.moments.as_slice()[core * response.size()..][..response.size()];
-    (coupling.flux_of_others_wb(0, moments), response.size())
+    (coupling.flux_of_others_wb(moments)[0], response.size())
 }
 
 /// The exchange rings of a long core were as many as gaps fit along it.

@@ -19,10 +19,12 @@ use std::f64::consts::{PI, TAU};
 use super::reaction::Dipole;
 use crate::steel::CoreShape;
 use crate::steel::array::ArrayResolution;
-use crate::steel::coupling::{GridPoint, Links, grid_points, integrate_stretched, shifted};
+use crate::steel::coupling::{GridPoint, grid_points, integrate_stretched, shifted};
 use crate::steel::exchange::Grading;
 use crate::steel::generatrix::Generatrix;
+use crate::steel::offsets::Offsets;
 use crate::steel::response::{Response, Rings};
+use crate::steel::symmetry::Motion;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::vec3::{dot, minus};
 
@@ -105,7 +107,16 @@ impl Neighbours {
             }
             basis.potentials.transpose() * sent * -turn
         };
-        let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged);
+        // A motion takes the potentials to combinations of them.
+        let turned = |motion: &Motion| {
+            let potentials = basis
+                .potentials
+                .column_iter()
+                .flat_map(|column| motion.before_on_grid(angles, column.as_slice()));
+            let potentials = DMatrix::from_iterator(points.len(), kept, potentials);
+            basis.potentials.tr_mul(&potentials)
+        };
+        let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged, turned);
         let form = system.lu().solve(&links).unwrap_or(links) * turn;
         Self {
             positions_m: positions_m.to_vec(),
@@ -203,39 +214,44 @@ impl Neighbours {
     }
 }
 
-/// The system 1 - L R of all cores and its links L, of blocks that `exchanged` gives for an offset.
+/// The system 1 - L R of all cores and its links L, of blocks that `exchanged` gives for an offset and
+/// what a motion does to their columns, `turned`.
 fn exchange_system(
     positions_m: &[[f64; 2]],
     reaction: &DMatrix<f64>,
     exchanged: impl Fn([f64; 2]) -> DMatrix<f64> + Sync,
+    turned: impl Fn(&Motion) -> DMatrix<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (kept, cores) = (reaction.ncols(), positions_m.len());
-    // Half of the pairs, of which many share an offset: the other half is their transpose.
-    let coupling = Links::new(positions_m);
-    let pairs: Vec<(usize, usize)> = (0..cores)
-        .flat_map(|i| (0..i).map(move |j| (i, j)))
+    let offsets = Offsets::of_pairs(positions_m);
+    let blocks: Vec<DMatrix<f64>> = (offsets.first_m.par_iter())
+        .map(|offset_m| exchanged(*offset_m))
         .collect();
-    let number = |(i, j): (usize, usize)| coupling.index[i * cores + j];
-    let mut offsets: Vec<usize> = pairs.iter().map(|pair| number(*pair)).collect();
-    offsets.sort_unstable();
-    offsets.dedup();
-    let blocks: Vec<DMatrix<f64>> = offsets
-        .par_iter()
-        .map(|number| exchanged(coupling.offsets_m[*number]))
-        .collect();
+    let turned: Vec<DMatrix<f64>> = offsets.motions.iter().map(turned).collect();
+    // Half of the pairs: the other half is their transpose.
+    let mut pairs = Vec::with_capacity(cores * cores / 2);
+    for (i, a) in positions_m.iter().enumerate() {
+        for (j, b) in positions_m[..i].iter().enumerate() {
+            let link = offsets.of([a[0] - b[0], a[1] - b[1]]);
+            pairs.extend(link.map(|link| (link, (i, j))));
+        }
+    }
+    pairs.sort_unstable();
     let size = kept * cores;
     let mut links = DMatrix::zeros(size, size);
     let mut system = DMatrix::identity(size, size);
-    for (i, j) in pairs {
-        let Ok(place) = offsets.binary_search(&number((i, j))) else {
-            continue;
-        };
-        let block = &blocks[place];
-        for (i, j, block) in [(i, j, block.clone()), (j, i, block.transpose())] {
-            let place = (i * kept, j * kept);
-            let mut view = system.view_mut(place, (kept, kept));
-            view -= &block * reaction;
-            links.view_mut(place, (kept, kept)).copy_from(&block);
+    for pairs in pairs.chunk_by(|(a, _), (b, _)| a == b) {
+        let (number, motion) = pairs[0].0;
+        let block = turned[motion].tr_mul(&blocks[number]) * &turned[motion];
+        for (block, back) in [(&block, false), (&block.transpose(), true)] {
+            let answered = block * reaction;
+            for (_, (i, j)) in pairs {
+                let (to, from) = if back { (j, i) } else { (i, j) };
+                let place = (to * kept, from * kept);
+                let mut view = system.view_mut(place, (kept, kept));
+                view -= &answered;
+                links.view_mut(place, (kept, kept)).copy_from(block);
+            }
         }
     }
     (system, links)
