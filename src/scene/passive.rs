@@ -25,8 +25,8 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
 /// The same of a plate and other bodies, whose finer panels take a minute.
 const IRON_LEFT_OUT: f64 = 0.05;
-/// Of it what tabulating the pull may add.
-const TABLE_SHARE: f64 = 0.1;
+/// Of a tolerance where the pull is left out what tabulating it may add.
+const TABLE_SHARE: f64 = 0.3;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
@@ -112,7 +112,7 @@ pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, Ru
     of_cores(&pulled, LEFT_OUT_TOLERANCE).map(Some)
 }
 
-/// Vertical pull at `places_m` from [`left_out`], N; about as exact.
+/// Vertical pull at `places_m` from [`left_out`], N; about as exact, and as exact where it is strongest.
 pub(super) fn left_out_z_n(scene: &Scene, pull: &Pull, places_m: &[[f64; 3]]) -> Vec<f64> {
     scattered_z_n(
         scene,

@@ -5,6 +5,7 @@
 //! for; of places that a symmetry of array, magnet and region maps to each other, one. What lies
 //! between is interpolated; whoever uses it compares it with the pull at places off the nodes.
 
+use std::cmp::Ordering;
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
@@ -94,48 +95,42 @@ pub(super) fn symmetries_of(scene: &Scene, region_m: [[f64; 2]; 3]) -> Vec<Turn>
 }
 
 /// Chebyshev nodes of an axis.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Nodes {
-    middle: f64,
-    half: f64,
-    count: usize,
+    at: Vec<f64>,
+    /// Barycentric weights.
+    shares: Vec<f64>,
 }
 
 impl Nodes {
     fn new([from, to]: [f64; 2], count: usize) -> Self {
-        let half = 0.5 * (to - from);
+        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        let count = if half > 0.0 { count } else { 1 };
+        let angle = |k: usize| PI * (k as f64 + 0.5) / count as f64;
+        // Mirrored nodes are mirrored to the last bit.
+        let unit = |k: usize| match (2 * k + 1).cmp(&count) {
+            Ordering::Less => angle(k).cos(),
+            Ordering::Equal => 0.0,
+            Ordering::Greater => -angle(count - 1 - k).cos(),
+        };
+        let share = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 } * angle(k).sin();
         Self {
-            middle: 0.5 * (from + to),
-            half,
-            count: if half > 0.0 { count } else { 1 },
+            at: (0..count).map(|k| middle + half * unit(k)).collect(),
+            shares: (0..count).map(share).collect(),
         }
     }
 
-    fn angle(self, k: usize) -> f64 {
-        PI * (k as f64 + 0.5) / self.count as f64
-    }
-
-    fn at(self, k: usize) -> f64 {
-        // Mirrored nodes are mirrored to the last bit.
-        let below = 2 * k >= self.count;
-        let unit = match below {
-            false => self.angle(k).cos(),
-            true => -self.angle(self.count - 1 - k).cos(),
-        };
-        self.middle + self.half * if 2 * k + 1 == self.count { 0.0 } else { unit }
+    fn count(&self) -> usize {
+        self.at.len()
     }
 
     /// Weight of every node's value at `position`: the barycentric formula.
-    fn weights(self, position: f64) -> Vec<f64> {
-        if self.count == 1 {
+    fn weights(&self, position: f64) -> Vec<f64> {
+        if let [_] = self.at[..] {
             return vec![1.0];
         }
-        let mut weights: Vec<f64> = (0..self.count)
-            .map(|k| {
-                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                sign * self.angle(k).sin() / (position - self.at(k))
-            })
-            .collect();
+        let nodes = self.at.iter().zip(&self.shares);
+        let mut weights: Vec<f64> = nodes.map(|(at, share)| share / (position - at)).collect();
         if let Some(hit) = weights.iter().position(|w| !w.is_finite()) {
             weights.fill(0.0);
             weights[hit] = 1.0;
@@ -206,20 +201,16 @@ impl Layout {
         let logs = z.map(|z| (z - top_m).ln());
         // ln(z - top) is singular where z - top turns to i times a core's size.
         let log_height = Nodes::new(logs, enough(aim, 0.5 * PI, 0.5 * (logs[1] - logs[0])));
-        let levels = (0..log_height.count)
-            .map(|k| {
-                let above_m = log_height.at(k).exp();
+        let swaps = turns.iter().any(|turn| turn.swap);
+        let levels = (log_height.at.iter())
+            .map(|log_height| {
+                let above_m = log_height.exp();
                 let away_m = above_m - axial_m.min(0.5 * above_m);
-                let nodes = |range: [f64; 2]| {
-                    let half = 0.5 * (range[1] - range[0]);
-                    Nodes::new(range, enough(aim, away_m, half))
-                };
-                let (mut x, mut y) = (nodes(x), nodes(y));
-                if turns.iter().any(|turn| turn.swap) {
-                    let count = x.count.max(y.count);
-                    (x.count, y.count) = (count, count);
-                }
-                let firsts = firsts([x.count, y.count], turns);
+                let counts = [x, y].map(|[from, to]| enough(aim, away_m, 0.5 * (to - from)));
+                let both = counts[0].max(counts[1]);
+                let [across, along] = if swaps { [both; 2] } else { counts };
+                let (x, y) = (Nodes::new(x, across), Nodes::new(y, along));
+                let firsts = firsts([x.count(), y.count()], turns);
                 let own = (0..firsts.len()).filter(|i| firsts[*i] == *i).collect();
                 LevelLayout {
                     x,
@@ -254,7 +245,10 @@ impl Layout {
             } = level;
             let places: Vec<[f64; 3]> = own
                 .iter()
-                .map(|i| [x.at(i % x.count), y.at(i / x.count), self.top_m + above_m])
+                .map(|i| {
+                    let (column, row) = (i % x.count(), i / x.count());
+                    [x.at[column], y.at[row], self.top_m + above_m]
+                })
                 .collect();
             let weight = above_m.powi(FALL);
             let mut values = vec![0.0; firsts.len()];
@@ -265,14 +259,14 @@ impl Layout {
                 values[i] = values[firsts[i]];
             }
             Level {
-                x: *x,
-                y: *y,
+                x: x.clone(),
+                y: y.clone(),
                 values,
             }
         });
         Table {
             top_m: self.top_m,
-            log_height: self.log_height,
+            log_height: self.log_height.clone(),
             levels: levels.collect(),
         }
     }
@@ -309,7 +303,7 @@ impl Table {
 impl Level {
     fn at(&self, [x, y]: [f64; 2]) -> f64 {
         let (along_x, along_y) = (self.x.weights(x), self.y.weights(y));
-        let rows = self.values.chunks(self.x.count).zip(&along_y);
+        let rows = self.values.chunks(self.x.count()).zip(&along_y);
         let of_row = |row: &[f64]| -> f64 { row.iter().zip(&along_x).map(|(v, w)| v * w).sum() };
         rows.map(|(row, weight)| weight * of_row(row)).sum()
     }
@@ -321,7 +315,7 @@ impl Level {
         // [own row, grid column]
         let rows: Vec<Vec<f64>> = self
             .values
-            .chunks(self.x.count)
+            .chunks(self.x.count())
             .map(|row| along_x.iter().map(|w| dot(w, row)).collect())
             .collect();
         let mut out = Vec::with_capacity(grid.x_m.len() * grid.y_m.len());
@@ -477,20 +471,20 @@ mod tests {
 
     #[test]
     fn polynomials_come_back_and_more_nodes_are_better() {
-        let of = |nodes: Nodes, f: &dyn Fn(f64) -> f64, at: f64| {
+        let of = |nodes: &Nodes, f: &dyn Fn(f64) -> f64, at: f64| {
             let weights = nodes.weights(at);
             weights
                 .iter()
                 .enumerate()
-                .map(|(k, w)| w * f(nodes.at(k)))
+                .map(|(k, w)| w * f(nodes.at[k]))
                 .sum::<f64>()
         };
         let cubic = |x: f64| 0.7 - 1.3 * x + 2.1 * x * x - 0.9 * x * x * x;
         let nodes = Nodes::new([-0.3, 1.7], 4);
-        for at in [-0.3, 0.11, nodes.at(2), 1.7] {
-            assert!((of(nodes, &cubic, at) - cubic(at)).abs() < 1e-14);
+        for at in [-0.3, 0.11, nodes.at[2], 1.7] {
+            assert!((of(&nodes, &cubic, at) - cubic(at)).abs() < 1e-14);
         }
-        assert_eq!(nodes.at(0) - 0.7, 0.7 - nodes.at(3));
+        assert_eq!(nodes.at[0] - 0.7, 0.7 - nodes.at[3]);
         // Singular `away` beside the axis: the rule's count gives the error aimed at.
         let (away, aim) = (0.013, 1e-5);
         let peak = |x: f64| away * away / (x * x + away * away);
@@ -498,7 +492,7 @@ mod tests {
         let nodes = Nodes::new([-0.05, 0.05], count);
         let worst = (0..500)
             .map(|i| -0.05 + 0.1 * f64::from(i) / 499.0)
-            .map(|x| (of(nodes, &peak, x) - peak(x)).abs())
+            .map(|x| (of(&nodes, &peak, x) - peak(x)).abs())
             .fold(0.0, f64::max);
         assert!(worst < 5.0 * aim, "{count}: {worst:e}");
         assert!(enough(1e-3, away, 0.05) < count);
