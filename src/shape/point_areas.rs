@@ -10,6 +10,7 @@
 //! among the points shows how badly. Such cells are quartered, and their quarters, until the corners do.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -83,21 +84,16 @@ pub fn areas_m2(
     let broken = broken_cells(grid, heights_m, height_at, progress)?;
     let mut fine = FineCells::default();
     if !broken.is_empty() {
-        for depth in DEPTHS.rev() {
-            fine = FineCells {
-                smooth: vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)],
-                point_area_m2: vec![0.0; heights_m.len()],
-                ..FineCells::default()
-            };
-            for &cell in &broken {
-                progress.check()?;
-                fine.smooth[cell] = !fine.sample(grid, cell, depth, height_at);
-                if fine.x_m.len() > MOST_SAMPLES && depth > *DEPTHS.start() {
-                    break;
-                }
-            }
-            if fine.x_m.len() <= MOST_SAMPLES {
-                break;
+        fine.smooth = vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)];
+        fine.point_area_m2 = vec![0.0; heights_m.len()];
+        for (cell, samples) in sampled(grid, &broken, height_at, progress)? {
+            fine.smooth[cell] = samples.is_empty();
+            for (part, [area_m2, coarse_area_m2]) in samples {
+                fine.x_m.push(part.at_m[0]);
+                fine.y_m.push(part.at_m[1]);
+                fine.height_m.push(part.height_m);
+                fine.area_m2.push(area_m2);
+                fine.coarse_area_m2.push(coarse_area_m2);
             }
         }
     }
@@ -114,59 +110,83 @@ pub fn areas_m2(
     Ok((areas, fine))
 }
 
-impl FineCells {
-    /// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
-    /// from their corners; `false` where none has surface.
-    fn sample(&mut self, grid: &Grid, cell: usize, depth: u32, height_at: HeightAt) -> bool {
-        let across = grid.x_m.samples - 1;
-        let part = |axis: Axis, node: usize| Axis {
-            from: axis.node(node),
-            to: axis.node(node + 1),
-            samples: (1 << depth) + 1,
-        };
-        let mut quarters = Quarters {
-            whole: depth,
-            x_m: part(grid.x_m, cell % across),
-            y_m: part(grid.y_m, cell / across),
-            height_at,
-            heights_m: BTreeMap::new(),
-            fine: Vec::new(),
-            coarse: Vec::new(),
-        };
-        quarters.divide(depth, [0, 0]);
-        let Quarters { fine, coarse, .. } = quarters;
-        let area = |rule: &[Part]| rule.iter().map(|part| part.area_m2).sum::<f64>();
-        let total = area(&fine);
-        if total == 0.0 {
-            return false;
-        }
-        let coarse = if coarse.is_empty() {
-            fine.clone()
+/// Samples of a cell: the part that each stands for, and its areas in both rules, m^2.
+type CellSamples = Vec<(Part, [f64; 2])>;
+
+/// The samples of every broken cell, as finely divided as their number allows.
+fn sampled(
+    grid: &Grid,
+    broken: &[usize],
+    height_at: HeightAt,
+    progress: &dyn Progress,
+) -> Result<Vec<(usize, CellSamples)>, Interrupted> {
+    for depth in DEPTHS.rev() {
+        let most = if depth > *DEPTHS.start() {
+            MOST_SAMPLES
         } else {
-            coarse
+            usize::MAX
         };
-        let scale = total / area(&coarse);
-        // A part that both rules share is one sample.
-        let shared = |part: &Part| coarse.iter().any(|other| other == part);
-        let rules = fine.iter().map(|part| {
-            let of_coarse = if shared(part) {
-                scale * part.area_m2
-            } else {
-                0.0
-            };
-            (part, [part.area_m2, of_coarse])
-        });
-        let coarse_alone = coarse.iter().filter(|part| !fine.contains(part));
-        let coarse_alone = coarse_alone.map(|part| (part, [0.0, scale * part.area_m2]));
-        for (part, [area_m2, coarse_area_m2]) in rules.chain(coarse_alone) {
-            self.x_m.push(part.at_m[0]);
-            self.y_m.push(part.at_m[1]);
-            self.height_m.push(part.height_m);
-            self.area_m2.push(area_m2);
-            self.coarse_area_m2.push(coarse_area_m2);
+        let so_far = AtomicUsize::new(0);
+        // `None` where there are too many by then: the cells are divided again.
+        let of_cell = |cell: &usize| {
+            fluxform_base::progress::poll();
+            (so_far.load(Relaxed) <= most).then(|| {
+                let samples = cell_samples(grid, *cell, depth, height_at);
+                so_far.fetch_add(samples.len(), Relaxed);
+                (*cell, samples)
+            })
+        };
+        let all: Option<Vec<_>> = broken.par_iter().map(of_cell).collect();
+        progress.check()?;
+        if let Some(all) = all.filter(|_| so_far.into_inner() <= most) {
+            return Ok(all);
         }
-        true
     }
+    Ok(Vec::new())
+}
+
+/// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
+/// from their corners; none where none has surface.
+fn cell_samples(grid: &Grid, cell: usize, depth: u32, height_at: HeightAt) -> CellSamples {
+    let across = grid.x_m.samples - 1;
+    let part = |axis: Axis, node: usize| Axis {
+        from: axis.node(node),
+        to: axis.node(node + 1),
+        samples: (1 << depth) + 1,
+    };
+    let mut quarters = Quarters {
+        whole: depth,
+        x_m: part(grid.x_m, cell % across),
+        y_m: part(grid.y_m, cell / across),
+        height_at,
+        heights_m: BTreeMap::new(),
+        fine: Vec::new(),
+        coarse: Vec::new(),
+    };
+    quarters.divide(depth, [0, 0]);
+    let Quarters { fine, coarse, .. } = quarters;
+    let area = |rule: &[Part]| rule.iter().map(|part| part.area_m2).sum::<f64>();
+    let total = area(&fine);
+    if total == 0.0 {
+        return Vec::new();
+    }
+    let coarse = if coarse.is_empty() {
+        fine.clone()
+    } else {
+        coarse
+    };
+    let scale = total / area(&coarse);
+    // A part that both rules share is one sample.
+    let of_coarse = |part: &Part| match coarse.contains(part) {
+        true => scale * part.area_m2,
+        false => 0.0,
+    };
+    let rules = fine
+        .iter()
+        .map(|part| (*part, [part.area_m2, of_coarse(part)]));
+    let coarse_alone = coarse.iter().filter(|part| !fine.contains(part));
+    let coarse_alone = coarse_alone.map(|part| (*part, [0.0, scale * part.area_m2]));
+    rules.chain(coarse_alone).collect()
 }
 
 /// A node of the finest division of a cell, along x and y.

@@ -96,9 +96,11 @@ impl Seen {
     /// How the vertical line through `p` meets the triangle.
     pub(super) fn contact(&self, p: Point) -> Contact {
         if self.wall {
-            return match self.near(p) {
-                Some(_) => Contact::Wall(self.wall_top(p)),
-                None => Contact::None,
+            // Of a wall's three edges one within reach will do.
+            let near = |(a, b)| edge_contact(a, b, p, self.reach).is_some();
+            return match self.edges().into_iter().any(near) {
+                true => Contact::Wall(self.wall_top(p)),
+                false => Contact::None,
             };
         }
         let [a, b, c] = self.vertices;

@@ -16,8 +16,10 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::matrix::add_product;
 
-/// Values of a drive that are one piece of work, about; fixed, so that results do not depend on threads.
+/// Values of a drive that are one piece of work, about, and pieces of fewer values; fixed, so that results
+/// do not depend on threads.
 const PIECE: usize = 192;
+const LEAST_PIECES: usize = 4;
 /// Dipoles whose kernels are there at once.
 const BLOCK: usize = 128;
 /// Cores whose patterns' fields are there at once.
@@ -209,7 +211,8 @@ impl ArraySources {
     /// The same without the array's symmetry.
     pub(super) fn sample_all(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
         let columns = self.drives * parts.count();
-        let piece = (PIECE / parts.count()).next_multiple_of(LANES);
+        let piece = (PIECE / parts.count()).min(points_m.len().div_ceil(LEAST_PIECES));
+        let piece = piece.next_multiple_of(LANES).max(LANES);
         let chunks: Vec<DMatrix<f64>> = points_m
             .par_chunks(piece)
             .map(|points| {

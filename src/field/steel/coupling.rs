@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 use super::exchange::LEAST_GAP;
 use super::offsets::Offsets;
 use super::response::{Response, Ring};
+use super::symmetry::Motion;
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
@@ -133,8 +134,11 @@ impl Coupling {
 
     /// Of values on the receiver's grid where the sender is at the pair's offset, those where it is.
     fn image(&self, pair: &Pair, values: &[f64]) -> DVector<f64> {
-        let motion = &self.offsets.motions[pair.motion];
-        DVector::from_vec(motion.image_on_grid(self.angles, values))
+        DVector::from_vec(self.motion(pair).image_on_grid(self.angles, values))
+    }
+
+    fn motion(&self, pair: &Pair) -> &Motion {
+        &self.offsets.motions[pair.motion]
     }
 
     /// Solves q - T K q = T p + q_own: `sent` are the potentials p of the other coils' windings,
@@ -191,11 +195,15 @@ impl Coupling {
                     let firsts = (0..problems).map(|problem| problem * cores);
                     firsts.flat_map(|first| pairs.iter().map(move |pair| (first, pair)))
                 };
-                let sent = columns().flat_map(|(first, pair)| {
-                    let sent = &moments.as_slice()[(first + pair.sender) * size..][..size];
-                    self.offsets.motions[pair.motion].before_on_grid(self.angles, sent)
-                });
-                let from = DMatrix::from_iterator(size, pairs.len() * problems, sent);
+                let mut from = DMatrix::zeros(size, pairs.len() * problems);
+                for (mut column, (first, pair)) in from.column_iter_mut().zip(columns()) {
+                    let sent = moments.column(first + pair.sender);
+                    for (before, after) in self.motion(pair).on_grid(self.angles, size) {
+                        column
+                            .rows_range_mut(before)
+                            .copy_from(&sent.rows_range(after));
+                    }
+                }
                 let products: Vec<DMatrix<f64>> = starts
                     .par_iter()
                     .map(|start| {
@@ -203,14 +211,17 @@ impl Coupling {
                         block.rows(*start, ROWS.min(size - start)) * &from
                     })
                     .collect();
+                let mut product = DVector::zeros(size);
                 for (k, (first, pair)) in columns().enumerate() {
-                    let rows = products.iter().flat_map(|part| {
-                        let rows = part.nrows();
-                        &part.as_slice()[k * rows..][..rows]
-                    });
-                    let product: Vec<f64> = rows.copied().collect();
+                    for (start, part) in starts.iter().zip(&products) {
+                        let mut rows = product.rows_mut(*start, part.nrows());
+                        rows.copy_from(&part.column(k));
+                    }
                     let mut column = received.column_mut(first + pair.receiver);
-                    column += self.image(pair, &product);
+                    for (before, after) in self.motion(pair).on_grid(self.angles, size) {
+                        let mut rows = column.rows_range_mut(after);
+                        rows += product.rows_range(before);
+                    }
                 }
             }
         }

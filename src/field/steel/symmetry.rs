@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::ops::Range;
 
 use crate::components::Components;
 
@@ -67,20 +68,22 @@ impl Motion {
     /// Values on a core's grid, as many side by side for every one of `angles`, after the motion.
     #[must_use]
     pub fn image_on_grid(&self, angles: usize, values: &[f64]) -> Vec<f64> {
-        let rings = values.len() / angles;
         let mut image = vec![0.0; values.len()];
-        for (k, values) in values.chunks_exact(rings).enumerate() {
-            image[self.angle(k, angles) * rings..][..rings].copy_from_slice(values);
+        for (before, after) in self.on_grid(angles, values.len()) {
+            image[after].copy_from_slice(&values[before]);
         }
         image
     }
 
-    /// The inverse of [`Motion::image_on_grid`].
-    #[must_use]
-    pub fn before_on_grid(&self, angles: usize, image: &[f64]) -> Vec<f64> {
-        let rings = image.len() / angles;
-        let from = |k: usize| &image[self.angle(k, angles) * rings..][..rings];
-        (0..angles).flat_map(from).copied().collect()
+    /// The ranges of `size` values on a core's grid that belong to every angle, and their images.
+    pub(super) fn on_grid(
+        &self,
+        angles: usize,
+        size: usize,
+    ) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        let rings = size / angles;
+        let range = move |k: usize| k * rings..(k + 1) * rings;
+        (0..angles).map(move |k| (range(k), range(self.angle(k, angles))))
     }
 }
 

@@ -109,11 +109,11 @@ impl Neighbours {
         };
         // A motion takes the potentials to combinations of them.
         let turned = |motion: &Motion| {
-            let potentials = basis
-                .potentials
-                .column_iter()
-                .flat_map(|column| motion.before_on_grid(angles, column.as_slice()));
-            let potentials = DMatrix::from_iterator(points.len(), kept, potentials);
+            let mut potentials = DMatrix::zeros(points.len(), kept);
+            for (before, after) in motion.on_grid(angles, points.len()) {
+                let image = basis.potentials.rows_range(after);
+                potentials.rows_range_mut(before).copy_from(&image);
+            }
             basis.potentials.tr_mul(&potentials)
         };
         let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged, turned);
@@ -279,8 +279,10 @@ fn products_of_modes(
     let mut products = vec![empty; response.layers.len()];
     for sender_angle in 0..angles {
         let at = ([closest_m, 0.0], sender_angle);
-        let sent = columns(response, points, at, inverse_distance);
-        let normal = columns(response, points, at, normal_derivative);
+        let (sent, normal) = rayon::join(
+            || columns(response, points, at, inverse_distance),
+            || columns(response, points, at, normal_derivative),
+        );
         let project = |matrix: &DMatrix<f64>, mode: usize, sine: bool| {
             let mut out = DMatrix::zeros(rings, rings);
             for k in 0..angles {
