@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 
-use super::physics::{Aim, ArrayPhysics, Constant, Journal};
+use super::physics::{Aim, ArrayPhysics, Constant, Journal, OtherAim};
 use super::{ArrayEnding, ArrayRequest, optimize_array, page, settling_in_array, tables, text};
 use crate::RunError;
 use crate::bundle::artefact::sha256_hex;
@@ -24,6 +24,7 @@ use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
 use crate::design::template::Template;
 use crate::design::{Design, Need};
+use crate::lambda::Criterion;
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Progress};
 use crate::scene::cost;
@@ -41,7 +42,7 @@ pub struct ArrayFlags {
     pub vary: Vec<String>,
     /// The force constant that is made large
     #[arg(long, hide_short_help = true, value_name = "NAME", requires = "shapes", default_value = "jnd",
-          value_parser = values::named::<Constant>())]
+          value_parser = values::either::<Criterion, OtherAim, Constant>())]
     pub constant: Constant,
     /// The force constant at which `--constant error` makes the error small, N/m
     #[arg(long = "lambda", hide_short_help = true, value_name = "N/M", requires = "shapes",
@@ -239,7 +240,7 @@ impl ArrayFlags {
     }
 
     fn aim(&self) -> Result<Aim, Failure> {
-        if (self.constant == Constant::Error) != self.at_n_per_m.is_some() {
+        if (self.constant == Constant::ERROR) != self.at_n_per_m.is_some() {
             return Err(Failure::Usage(
                 "--constant error and --lambda go together: the error depends on the force constant, \
                  the other constants on none"

@@ -257,8 +257,8 @@ fn result(
     let ratios = ratios(physical, given);
     let gain = together(&ratios, request.shares.as_deref());
     let constant = physics.aim().constant;
-    let of_constant = |merit: f64| (constant != Constant::Error).then_some(merit);
-    let of_error = |merit: f64| (constant == Constant::Error).then(|| merit.recip());
+    let of_constant = |merit: f64| (constant != Constant::ERROR).then_some(merit);
+    let of_error = |merit: f64| (constant == Constant::ERROR).then(|| merit.recip());
     let shape = |(index, source): (usize, &ShapeSource)| {
         let (before, now) = (given.merits[index], physical.merits[index]);
         ShapeGain {

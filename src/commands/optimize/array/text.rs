@@ -1,6 +1,6 @@
 //! The summary of `optimize --for`.
 
-use super::physics::Constant;
+use super::physics::{Constant, OtherAim};
 use super::{ArrayEnding, ArrayOptimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::layout::{Sheet, Side, table};
@@ -119,13 +119,8 @@ pub fn one_more(limit: &LimitWorth) -> String {
 
 fn shapes(result: &ArrayOptimization) -> String {
     let what = match result.constant {
-        Constant::Error => "error",
-        Constant::Linear
-        | Constant::Jnd
-        | Constant::Saturation
-        | Constant::Maxmin
-        | Constant::Feedback
-        | Constant::Vector => "lambda",
+        Constant::ERROR => "error",
+        Constant::Static(_) | Constant::Other(OtherAim::Feedback | OtherAim::Vector) => "lambda",
     };
     let head = ["shape", "before", what, "gain"]
         .map(str::to_owned)
