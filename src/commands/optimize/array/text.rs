@@ -107,7 +107,7 @@ pub fn one_more(limit: &LimitWorth) -> String {
         None if limit.key.ends_with("_m") => ("mm", 1e3),
         None => ("mm", 1.0),
     };
-    let label = crate::cli::limits::label(limit.key);
+    let label = crate::report::limits::label(limit.key);
     let given = percent(limit.gain_per_unit.abs() / per_si);
     let way = if limit.gain_per_unit < 0.0 {
         "less"
