@@ -16,6 +16,8 @@ use std::collections::BTreeMap;
 pub use design_document::Document;
 pub use result::*;
 
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -41,13 +43,18 @@ use crate::scene::{Scene, coupled};
 const NEIGHBOURS_AGREE: f64 = 1e-3;
 
 /// A dimension that may be given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
 pub enum Dimension {
-    /// `coil.inner_diameter_mm`.
+    /// The bore
+    #[strum(serialize = "inner_diameter_mm")]
     InnerDiameter,
-    /// `coil.outer_diameter_mm`.
+    /// The outer diameter
+    #[strum(serialize = "outer_diameter_mm")]
     OuterDiameter,
-    /// `coil.length_mm`.
+    /// The length
+    #[strum(serialize = "length_mm")]
     Length,
 }
 
