@@ -1,17 +1,16 @@
-//! Limits on screen.
+//! Limits, and a coil's other numbers, on screen.
 
-use super::quantity::{mass, mm, number, si};
+use super::quantity::{force, mass, mm, number, si};
 use crate::coil::limits::{Direction, by_key};
+use crate::report::limits::{label, words};
 
-/// The name on screen of the limit that artefacts call `key`.
-pub fn label(key: &str) -> &str {
-    by_key(key).map_or(key, |limit| limit.label)
-}
-
-/// A value of that limit, SI, in its unit on screen.
+/// A value of the limit, or of the number, that artefacts call `key`, SI, in its unit on screen.
 pub fn limit_value(key: &str, value: f64) -> String {
-    match by_key(key).map_or("", |limit| limit.unit) {
+    match by_key(key).map_or_else(|| words(key).1, |limit| limit.unit) {
+        "N" => force(value),
         "mm" => mm(value),
+        // Dimensions are drawn in millimetres; wire is bought by the metre.
+        "m" if by_key(key).is_none() => mm(value),
         "g" => mass(value),
         "" => number(value),
         unit => si(value, unit),
@@ -25,7 +24,7 @@ pub fn limit_row(key: &str, value: f64, limit: f64, state: &str) -> Vec<String> 
         Some(Direction::AtMost | Direction::Equal) | None => "<=",
     };
     vec![
-        label(key).to_owned(),
+        label(key),
         limit_value(key, value),
         format!("{sign} {}", limit_value(key, limit)),
         state.to_owned(),

@@ -1,12 +1,15 @@
 //! How every command begins and ends: the stop signal, the bar, the folder it writes to, the accuracy reached.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use super::bar::Bar;
 use super::failure::{Failure, Wish};
 use super::interrupt;
-use super::printer::Printer;
+use super::printer::{Printer, Stream};
 use super::values::FileArgument;
+use crate::RunError;
+use crate::bundle::atomic::{Overwrite, write};
 
 /// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
 pub fn begin(printer: &Printer) -> Bar {
@@ -26,6 +29,29 @@ pub fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
         FileArgument::Standard => Err(Failure::Usage(
             "--out names a folder here, which standard output (-) is not; name a folder".to_owned(),
         )),
+    }
+}
+
+/// Writes what `content` writes where that was requested, as `overwrite` allows; returns where the summary goes.
+///
+/// # Errors
+/// A file that is not ours; a stream that takes no more.
+pub fn write_to(
+    file: Option<&FileArgument>,
+    overwrite: &Overwrite,
+    printer: &Printer,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Stream, Failure> {
+    match file {
+        None => Ok(Stream::Output),
+        Some(FileArgument::Standard) => {
+            printer.data(content)?;
+            Ok(Stream::Error)
+        }
+        Some(FileArgument::Path(path)) => {
+            write(path, overwrite, content).map_err(RunError::from)?;
+            Ok(Stream::Output)
+        }
     }
 }
 

@@ -19,12 +19,29 @@ pub fn named<T>() -> impl TypedValueParser<Value = T>
 where
     T: Choice<Err: std::error::Error + Send + Sync + 'static>,
 {
-    let of = |one: &T| {
+    PossibleValuesParser::new(possible::<T>()).try_map(|name| name.parse::<T>())
+}
+
+/// The same for a value that is of one of two enums.
+pub fn either<A, B, T>() -> impl TypedValueParser<Value = T>
+where
+    A: Choice,
+    B: Choice<Err: std::error::Error + Send + Sync + 'static>,
+    T: From<A> + From<B> + Clone + Send + Sync + 'static,
+{
+    let names = PossibleValuesParser::new(possible::<A>().chain(possible::<B>()));
+    names.try_map(|name| match name.parse::<A>() {
+        Ok(one) => Ok(T::from(one)),
+        Err(_) => name.parse::<B>().map(T::from),
+    })
+}
+
+/// The names of an enum with their meanings.
+fn possible<T: Choice>() -> impl Iterator<Item = PossibleValue> {
+    T::VARIANTS.iter().map(|one| {
         let name: &'static str = (*one).into();
         PossibleValue::new(name).help(one.get_documentation().unwrap_or_default())
-    };
-    let names = PossibleValuesParser::new(T::VARIANTS.iter().map(of));
-    names.try_map(|name| name.parse::<T>())
+    })
 }
 
 /// Most threads that may be asked for.

@@ -82,6 +82,37 @@ pub enum Direction {
     Equal,
 }
 
+/// What of one coil a limit bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CoilQuantity {
+    /// Outer diameter, m.
+    OuterDiameter,
+    /// Inner diameter, m.
+    InnerDiameter,
+    /// Length, m.
+    Length,
+    /// Depth of the winding, m.
+    Depth,
+    /// R, ohm.
+    Resistance,
+    /// Five time constants, s.
+    Settling,
+    /// Heat at the rated current, W.
+    Power,
+    /// Mass of wire and core, kg.
+    Mass,
+    /// Length of wire, m.
+    WireLength,
+    /// Flux density in the core, T.
+    CoreField,
+    /// Turns over turns that fit.
+    WindingFill,
+    /// Voltage at the rated current, V.
+    Voltage,
+    /// The rated current, A.
+    Current,
+}
+
 /// A unit and how many of it are one SI unit.
 pub type Scaled = (&'static str, f64);
 
@@ -105,8 +136,8 @@ pub struct Limit {
     pub direction: Direction,
     /// Whether it alone gives the force a maximum.
     pub ends_growth: bool,
-    /// Whether it is one of the whole array, not of a coil.
-    pub of_array: bool,
+    /// What it bounds of one coil; `None` where it is one of the whole array.
+    pub quantity: Option<CoilQuantity>,
     /// Whether its value follows from shapes, not from a design alone.
     pub of_shapes: bool,
     /// The limit that a design sets, SI.
@@ -240,7 +271,7 @@ const SIZE: Limit = Limit {
     step: MM,
     direction: Direction::AtMost,
     ends_growth: false,
-    of_array: false,
+    quantity: Some(CoilQuantity::OuterDiameter),
     of_shapes: false,
     of: |limits| limits.outer_diameter_max_m,
     value: |at| Some(at.coil()?.outer_diameter_m),
@@ -255,7 +286,7 @@ const HEAT_OF_ALL: Limit = Limit {
     unit: "W",
     written: ("W", 1.0),
     step: ("W", 1.0),
-    of_array: true,
+    quantity: None,
     of: |limits| limits.array_power_max_w,
     value: |at| Some(at.array_power_w()),
     ..SIZE
@@ -277,6 +308,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "limits.inner_diameter_min_mm",
         label: "inner diameter",
         direction: Direction::AtLeast,
+        quantity: Some(CoilQuantity::InnerDiameter),
         of: |limits| limits.inner_diameter_min_m,
         value: |at| Some(at.coil()?.inner_diameter_m),
         ..SIZE
@@ -286,6 +318,7 @@ pub static LIMITS: &[Limit] = &[
         key: "length_m",
         design_key: "limits.length_max_mm",
         label: "length",
+        quantity: Some(CoilQuantity::Length),
         of: |limits| limits.length_max_m,
         value: |at| Some(at.coil()?.length_m),
         ..SIZE
@@ -299,6 +332,7 @@ pub static LIMITS: &[Limit] = &[
         written: ("ohm", 1.0),
         step: ("ohm", 1.0),
         ends_growth: true,
+        quantity: Some(CoilQuantity::Resistance),
         of: |limits| limits.resistance_max_ohm,
         value: |at| Some(at.circuit.resistance_ohm),
         ..SIZE
@@ -312,6 +346,7 @@ pub static LIMITS: &[Limit] = &[
         written: ("ms", 1e3),
         step: ("ms", 1e3),
         ends_growth: true,
+        quantity: Some(CoilQuantity::Settling),
         of: |limits| limits.settling_max_s,
         value: |at| Some(at.settling_s(at.circuit.inductance_h)),
         ..SIZE
@@ -325,6 +360,7 @@ pub static LIMITS: &[Limit] = &[
         written: ("W", 1.0),
         step: ("W", 1.0),
         ends_growth: true,
+        quantity: Some(CoilQuantity::Power),
         of: |limits| limits.power_max_w,
         value: |at| Some(at.power_w),
         ..SIZE
@@ -338,6 +374,7 @@ pub static LIMITS: &[Limit] = &[
         written: ("kg", 1.0),
         step: ("g", 1e3),
         ends_growth: true,
+        quantity: Some(CoilQuantity::Mass),
         of: |limits| limits.mass_max_kg,
         value: |at| Some(at.mass_kg),
         ..SIZE
@@ -351,6 +388,7 @@ pub static LIMITS: &[Limit] = &[
         written: ("m", 1.0),
         step: ("m of wire", 1.0),
         ends_growth: true,
+        quantity: Some(CoilQuantity::WireLength),
         of: |limits| limits.wire_length_max_m,
         value: |at| Some(at.circuit.wire_length_m),
         ..SIZE
@@ -363,6 +401,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "T",
         written: ("T", 1.0),
         step: ("mT", 1e3),
+        quantity: Some(CoilQuantity::CoreField),
         of: |limits| limits.core_field_max_t,
         value: |at| at.core_field_t,
         ..SIZE
@@ -372,7 +411,7 @@ pub static LIMITS: &[Limit] = &[
         key: "footprint_m",
         design_key: "limits.footprint_max_mm",
         label: "footprint",
-        of_array: true,
+        quantity: None,
         of: |limits| limits.footprint_max_m,
         value: |at| at.footprint_m(),
         ..SIZE
@@ -406,7 +445,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "g",
         written: ("kg", 1.0),
         step: ("kg", 1.0),
-        of_array: true,
+        quantity: None,
         of: |limits| limits.array_mass_max_kg,
         value: |at| Some(at.array_mass_kg()),
         ..SIZE
@@ -419,7 +458,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "s",
         written: ("ms", 1e3),
         step: ("ms", 1e3),
-        of_array: true,
+        quantity: None,
         of: |limits| limits.array_settling_max_s,
         value: |at| Some(at.settling_s(at.array_inductance_h?)),
         ..SIZE
@@ -432,7 +471,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "",
         written: ("", 1.0),
         step: ("", 1.0),
-        of_array: true,
+        quantity: None,
         of: |limits| limits.array_cost_max,
         value: |at| Some(at.array_cost()),
         ..SIZE
@@ -445,6 +484,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "",
         written: ("", 1.0),
         step: ("", 1.0),
+        quantity: Some(CoilQuantity::WindingFill),
         of: |_| Some(1.0),
         value: winding_fill,
         ..SIZE
@@ -457,6 +497,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "V",
         written: ("V", 1.0),
         step: ("V", 1.0),
+        quantity: Some(CoilQuantity::Voltage),
         ..IMPLIED
     },
     Limit {
@@ -467,6 +508,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "A",
         written: ("A", 1.0),
         step: ("A", 1.0),
+        quantity: Some(CoilQuantity::Current),
         ..IMPLIED
     },
     Limit {
@@ -475,6 +517,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "wire.diameter_mm",
         label: "wire diameter",
         direction: Direction::AtLeast,
+        quantity: Some(CoilQuantity::Depth),
         ..IMPLIED
     },
     Limit {
@@ -483,6 +526,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "wire.diameter_mm",
         label: "wire diameter",
         direction: Direction::AtLeast,
+        quantity: Some(CoilQuantity::Length),
         ..IMPLIED
     },
     Limit {
@@ -491,6 +535,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "coil.inner_diameter_mm",
         label: "axis",
         direction: Direction::AtLeast,
+        quantity: Some(CoilQuantity::InnerDiameter),
         ..IMPLIED
     },
     Limit {
@@ -506,6 +551,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "coil.inner_diameter_mm",
         label: "inner diameter",
         direction: Direction::Equal,
+        quantity: Some(CoilQuantity::InnerDiameter),
         ..IMPLIED
     },
     Limit {
@@ -520,6 +566,7 @@ pub static LIMITS: &[Limit] = &[
         design_key: "coil.length_mm",
         label: "length",
         direction: Direction::Equal,
+        quantity: Some(CoilQuantity::Length),
         ..IMPLIED
     },
 ];

@@ -70,9 +70,24 @@ struct Arguments {
     command: Option<Command>,
 }
 
-/// The commands; each is described in its own file.
-#[derive(Debug, Subcommand)]
-enum Command {
+/// The commands and the way to each.
+macro_rules! commands {
+    ($($(#[$of:meta])* $name:ident($arguments:ty),)+) => {
+        /// The commands; each is described in its own file.
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$of])* $name($arguments),)+
+        }
+
+        fn run(command: &Command, printer: &Printer) -> Result<(), Failure> {
+            match command {
+                $(Command::$name(command) => command.run(printer),)+
+            }
+        }
+    };
+}
+
+commands! {
     Init(init::command::Init),
     Keys(keys::command::Keys),
     Evaluate(evaluate::command::Evaluate),
@@ -135,27 +150,6 @@ impl Program for Arguments {
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
-}
-
-fn run(command: &Command, printer: &Printer) -> Result<(), Failure> {
-    match command {
-        Command::Init(command) => command.run(printer),
-        Command::Keys(command) => command.run(printer),
-        Command::Evaluate(command) => command.run(printer),
-        Command::Probe(command) => command.run(printer),
-        Command::Map(command) => command.run(printer),
-        Command::Discretize(command) => command.run(printer),
-        Command::Lambda(command) => command.run(printer),
-        Command::Calibrate(command) => command.run(printer),
-        Command::Compare(command) => command.run(printer),
-        Command::Verify(command) => command.run(printer),
-        Command::Optimize(command) => command.run(printer),
-        Command::Sweep(command) => command.run(printer),
-        Command::Replay(command) => command.run(printer),
-        Command::Bench(command) => command.run(printer),
-        Command::Completions(command) => command.run(printer),
-        Command::Man(command) => command.run(printer),
-    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! which is written here and held against the reader by a test.
 
 use super::draft::{Draft, Need};
+use super::limits;
 use super::reader::list_keys;
 
 pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
@@ -18,7 +19,7 @@ pub fn of_designs() -> Vec<Key> {
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
     });
-    with_meanings(keys, MEANINGS)
+    with_meanings(keys, &[MEANINGS, limits::MEANINGS].concat())
 }
 
 const MEANINGS: &[(&str, &str)] = &[
@@ -171,52 +172,6 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "supply.bandwidth_hz",
         "bandwidth of a current loop; without it 1000",
-    ),
-    (
-        "limits.resistance_max_ohm",
-        "resistance at the wire's temperature",
-    ),
-    ("limits.settling_max_ms", "five time constants of the coil"),
-    (
-        "limits.outer_diameter_max_mm",
-        "outer diameter of the winding",
-    ),
-    (
-        "limits.inner_diameter_min_mm",
-        "bore of the winding, at least; without it `optimize --wound` takes that of a bobbin",
-    ),
-    ("limits.length_max_mm", "length of the winding"),
-    ("limits.power_max_w", "heat at the rated current"),
-    ("limits.mass_max_kg", "mass of wire and core"),
-    ("limits.wire_length_max_m", "length of the wire"),
-    ("limits.core_field_max_t", "flux density in the core"),
-    (
-        "limits.footprint_max_mm",
-        "larger side of the rectangle that holds all coils and the plate",
-    ),
-    (
-        "limits.array_power_max_w",
-        "heat of all coils at the largest currents that the supply allows",
-    ),
-    (
-        "limits.static_power_max_w",
-        "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes",
-    ),
-    (
-        "limits.feedback_power_max_w",
-        "mean heat of all coils over that shape with position feedback, currents of least power; known only with shapes",
-    ),
-    (
-        "limits.array_mass_max_kg",
-        "mass of all coils, cores and the plate",
-    ),
-    (
-        "limits.array_settling_max_ms",
-        "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`",
-    ),
-    (
-        "limits.array_cost_max",
-        "cost of all coils, cores and the plate by `[cost]`",
     ),
     (
         "cost.per_coil",

@@ -4,41 +4,61 @@ use super::reader::Section;
 use super::rule::{BODY_MM, Bound, Rule, slip};
 use fluxform_base::units::m_from_mm;
 
-/// Limits; `None` where the design names none.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
-    /// Resistance at the wire's temperature, ohm.
-    pub resistance_max_ohm: Option<f64>,
-    /// Five time constants, s.
-    pub settling_max_s: Option<f64>,
-    /// Outer diameter, m.
-    pub outer_diameter_max_m: Option<f64>,
-    /// Inner diameter (a lower limit), m.
-    pub inner_diameter_min_m: Option<f64>,
-    /// Length, m.
-    pub length_max_m: Option<f64>,
-    /// Heat at the rated current, W.
-    pub power_max_w: Option<f64>,
-    /// Mass of wire and core, kg.
-    pub mass_max_kg: Option<f64>,
-    /// Length of wire, m.
-    pub wire_length_max_m: Option<f64>,
-    /// Flux density in the core, T.
-    pub core_field_max_t: Option<f64>,
-    /// Side of the square that holds all coils, m.
-    pub footprint_max_m: Option<f64>,
-    /// Heat of all coils at their largest currents, W.
-    pub array_power_max_w: Option<f64>,
-    /// Heat of all coils at the static currents of the shape that takes most, W.
-    pub static_power_max_w: Option<f64>,
-    /// Mean heat of all coils with position feedback over the shape that takes most, W.
-    pub feedback_power_max_w: Option<f64>,
-    /// Mass of all coils with their cores, kg.
-    pub array_mass_max_kg: Option<f64>,
-    /// Five time constants of the slowest pattern of currents in the array, s.
-    pub array_settling_max_s: Option<f64>,
-    /// Cost of all coils, cores and the plate, in the currency of [`Prices`].
-    pub array_cost_max: Option<f64>,
+/// The rule on a key's numbers, and their way to SI.
+type Unit = (Rule, fn(f64) -> f64);
+
+const MM: Unit = (BODY_MM, m_from_mm);
+const MS: Unit = (
+    Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]),
+    |ms| ms / 1000.0,
+);
+
+const fn si(unit: &'static str) -> Unit {
+    (Rule::any(unit), |value| value)
+}
+
+/// The struct, its reader and the keys' meanings from one table: a limit's field, key, unit and meaning.
+macro_rules! limits {
+    ($($field:ident: $key:literal, $unit:expr, $meaning:literal;)+) => {
+        /// Limits, SI; `None` where the design names none.
+        #[derive(Debug, Clone, Copy, PartialEq, Default)]
+        pub struct Limits {
+            $(#[doc = concat!("The ", $meaning, ".")] pub $field: Option<f64>,)+
+        }
+
+        /// The meanings of the section's keys.
+        pub(crate) const MEANINGS: &[(&str, &str)] = &[$((concat!("limits.", $key), $meaning)),+];
+
+        /// Reads the section.
+        pub(crate) fn read(mut s: Section<'_>) -> Limits {
+            let mut limit = |key, (rule, si): Unit| {
+                let given = s.number(key, &rule.bound(Bound::Limit));
+                given.map(|limit| si(limit.value))
+            };
+            let limits = Limits { $($field: limit($key, $unit)),+ };
+            s.finish();
+            limits
+        }
+    };
+}
+
+limits! {
+    resistance_max_ohm: "resistance_max_ohm", si("ohm"), "resistance at the wire's temperature";
+    settling_max_s: "settling_max_ms", MS, "five time constants of the coil";
+    outer_diameter_max_m: "outer_diameter_max_mm", MM, "outer diameter of the winding";
+    inner_diameter_min_m: "inner_diameter_min_mm", MM, "bore of the winding, at least; without it `optimize --wound` takes that of a bobbin";
+    length_max_m: "length_max_mm", MM, "length of the winding";
+    power_max_w: "power_max_w", si("W"), "heat at the rated current";
+    mass_max_kg: "mass_max_kg", si("kg"), "mass of wire and core";
+    wire_length_max_m: "wire_length_max_m", si("m"), "length of the wire";
+    core_field_max_t: "core_field_max_t", si("T"), "flux density in the core";
+    footprint_max_m: "footprint_max_mm", MM, "larger side of the rectangle that holds all coils and the plate";
+    array_power_max_w: "array_power_max_w", si("W"), "heat of all coils at the largest currents that the supply allows";
+    static_power_max_w: "static_power_max_w", si("W"), "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes";
+    feedback_power_max_w: "feedback_power_max_w", si("W"), "mean heat of all coils over that shape with position feedback, currents of least power; known only with shapes";
+    array_mass_max_kg: "array_mass_max_kg", si("kg"), "mass of all coils, cores and the plate";
+    array_settling_max_s: "array_settling_max_ms", MS, "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`";
+    array_cost_max: "array_cost_max", si(""), "cost of all coils, cores and the plate by `[cost]`";
 }
 
 /// Prices in any one currency; 0 where the design names none.
@@ -50,33 +70,6 @@ pub struct Prices {
     pub wire_per_kg: f64,
     /// Of a kilogram of steel.
     pub steel_per_kg: f64,
-}
-
-const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
-
-/// Reads the section.
-pub(crate) fn read(mut s: Section<'_>) -> Limits {
-    let mut limit = |key, rule: Rule| s.number(key, &rule.bound(Bound::Limit)).map(|l| l.value);
-    let limits = Limits {
-        resistance_max_ohm: limit("resistance_max_ohm", Rule::any("ohm")),
-        settling_max_s: limit("settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
-        outer_diameter_max_m: limit("outer_diameter_max_mm", BODY_MM).map(m_from_mm),
-        inner_diameter_min_m: limit("inner_diameter_min_mm", BODY_MM).map(m_from_mm),
-        length_max_m: limit("length_max_mm", BODY_MM).map(m_from_mm),
-        power_max_w: limit("power_max_w", Rule::any("W")),
-        mass_max_kg: limit("mass_max_kg", Rule::any("kg")),
-        wire_length_max_m: limit("wire_length_max_m", Rule::any("m")),
-        core_field_max_t: limit("core_field_max_t", Rule::any("T")),
-        footprint_max_m: limit("footprint_max_mm", BODY_MM).map(m_from_mm),
-        array_power_max_w: limit("array_power_max_w", Rule::any("W")),
-        static_power_max_w: limit("static_power_max_w", Rule::any("W")),
-        feedback_power_max_w: limit("feedback_power_max_w", Rule::any("W")),
-        array_mass_max_kg: limit("array_mass_max_kg", Rule::any("kg")),
-        array_settling_max_s: limit("array_settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
-        array_cost_max: limit("array_cost_max", Rule::any("")),
-    };
-    s.finish();
-    limits
 }
 
 /// Reads `[cost]`.

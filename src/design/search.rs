@@ -134,81 +134,56 @@ const TWICE: &str = "a choice is there twice";
 const ONCE: &str = "give each value once";
 
 const COUNT: Rule = Rule::any("").bound(Bound::AtLeast(1.0));
+const BODY: Rule = BODY_MM.positive();
+const GAP: Rule = OFFSET_MM.bound(Bound::NotNegative);
+
+/// A key with its path in a design and the rule on its values.
+type Row = (SearchKey, &'static str, Rule);
+
+/// The keys, section by section.
+static KEYS: [Row; 17] = [
+    (SearchKey::InnerDiameter, "coil.inner_diameter_mm", BODY),
+    (SearchKey::OuterDiameter, "coil.outer_diameter_mm", BODY),
+    (SearchKey::Length, "coil.length_mm", BODY),
+    (SearchKey::Wire, "wire.diameter_mm", WIRE_MM.positive()),
+    (SearchKey::Clearance, "core.clearance_mm", GAP),
+    (SearchKey::Above, "core.above_mm", OFFSET_MM),
+    (SearchKey::Below, "core.below_mm", OFFSET_MM),
+    (SearchKey::PlateThickness, "plate.thickness_mm", BODY),
+    (SearchKey::PlateX, "plate.x_mm", BODY),
+    (SearchKey::PlateY, "plate.y_mm", BODY),
+    (SearchKey::PlateDiameter, "plate.diameter_mm", BODY),
+    (SearchKey::PlateGap, "plate.gap_mm", GAP),
+    (SearchKey::Pitch, "array.pitch_mm", BODY),
+    (SearchKey::Rows, "array.rows", COUNT),
+    (SearchKey::Columns, "array.columns", COUNT),
+    (SearchKey::Move, "array.move_mm", OFFSET_MM),
+    (SearchKey::Height, "shapes.height_mm", OFFSET_MM),
+];
+
+/// The section `of`, its [`KEYS`] read into `space`.
+fn section<'a>(space: &mut SearchSpace, s: &mut Section<'a>, of: &'static str) -> Section<'a> {
+    let mut section = s.section(of);
+    for (key, path, rule) in &KEYS {
+        if let Some((_, name)) = path.split_once('.').filter(|(first, _)| *first == of) {
+            add(space, &mut section, *key, name, rule);
+        }
+    }
+    section
+}
 
 /// Reads the section.
-///
-/// Long because every key is declared where it is read, on a line of its own.
 pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
     let mut space = SearchSpace::default();
-    let body = BODY_MM.positive();
-    let mut coil = s.section("coil");
-    add(
-        &mut space,
-        &mut coil,
-        SearchKey::InnerDiameter,
-        "inner_diameter_mm",
-        &body,
-    );
-    add(
-        &mut space,
-        &mut coil,
-        SearchKey::OuterDiameter,
-        "outer_diameter_mm",
-        &body,
-    );
-    add(&mut space, &mut coil, SearchKey::Length, "length_mm", &body);
-    coil.finish();
-    let mut wire = s.section("wire");
-    add(
-        &mut space,
-        &mut wire,
-        SearchKey::Wire,
-        "diameter_mm",
-        &WIRE_MM.positive(),
-    );
-    wire.finish();
-    let mut core = s.section("core");
-    add(
-        &mut space,
-        &mut core,
-        SearchKey::Clearance,
-        "clearance_mm",
-        &OFFSET_MM.bound(Bound::NotNegative),
-    );
-    add(
-        &mut space,
-        &mut core,
-        SearchKey::Above,
-        "above_mm",
-        &OFFSET_MM,
-    );
-    add(
-        &mut space,
-        &mut core,
-        SearchKey::Below,
-        "below_mm",
-        &OFFSET_MM,
-    );
+    section(&mut space, &mut s, "coil").finish();
+    section(&mut space, &mut s, "wire").finish();
+    let mut core = section(&mut space, &mut s, "core");
     space.without_core = core.flag_or("none", false);
     core.finish();
-    read_plate(&mut space, s.section("plate"));
-    let mut array = s.section("array");
-    add(&mut space, &mut array, SearchKey::Pitch, "pitch_mm", &body);
-    add(&mut space, &mut array, SearchKey::Rows, "rows", &COUNT);
-    add(
-        &mut space,
-        &mut array,
-        SearchKey::Columns,
-        "columns",
-        &COUNT,
-    );
-    add(
-        &mut space,
-        &mut array,
-        SearchKey::Move,
-        "move_mm",
-        &OFFSET_MM,
-    );
+    let mut plate = section(&mut space, &mut s, "plate");
+    space.without_plate = plate.flag_or("none", false);
+    plate.finish();
+    let mut array = section(&mut space, &mut s, "array");
     space.layouts = array.choices("layout");
     space.symmetry = array.choice("symmetry").unwrap_or_default();
     array.finish();
@@ -224,89 +199,35 @@ pub(crate) fn read(mut s: Section<'_>) -> SearchSpace {
         magnet.fault("size_mm", TWICE, ONCE);
     }
     magnet.finish();
-    let mut shapes = s.section("shapes");
-    add(
-        &mut space,
-        &mut shapes,
-        SearchKey::Height,
-        "height_mm",
-        &OFFSET_MM,
-    );
-    shapes.finish();
+    section(&mut space, &mut s, "shapes").finish();
     s.finish();
     space
-}
-
-fn read_plate(space: &mut SearchSpace, mut s: Section<'_>) {
-    let body = BODY_MM.positive();
-    let gap = OFFSET_MM.bound(Bound::NotNegative);
-    add(
-        space,
-        &mut s,
-        SearchKey::PlateThickness,
-        "thickness_mm",
-        &body,
-    );
-    add(space, &mut s, SearchKey::PlateX, "x_mm", &body);
-    add(space, &mut s, SearchKey::PlateY, "y_mm", &body);
-    add(
-        space,
-        &mut s,
-        SearchKey::PlateDiameter,
-        "diameter_mm",
-        &body,
-    );
-    add(space, &mut s, SearchKey::PlateGap, "gap_mm", &gap);
-    space.without_plate = s.flag_or("none", false);
-    s.finish();
 }
 
 /// Most magnets to choose from.
 const MAGNETS_MAX: usize = 100;
 
 impl SearchKey {
+    /// Its path in a design, like `coil.length_mm`.
+    #[must_use]
+    pub fn path(self) -> &'static str {
+        KEYS[self as usize].1
+    }
+
     /// Whether it is one of a coil alone.
     fn is_of_coil(self) -> bool {
-        match self {
-            Self::InnerDiameter
-            | Self::OuterDiameter
-            | Self::Length
-            | Self::Wire
-            | Self::Clearance
-            | Self::Above
-            | Self::Below => true,
-            Self::PlateThickness
-            | Self::PlateX
-            | Self::PlateY
-            | Self::PlateDiameter
-            | Self::PlateGap
-            | Self::Pitch
-            | Self::Rows
-            | Self::Columns
-            | Self::Move
-            | Self::Height => false,
-        }
+        let of_coil = ["coil.", "wire.", "core."];
+        of_coil.iter().any(|of| self.path().starts_with(of))
+    }
+
+    /// Whether its values are whole numbers.
+    fn is_count(self) -> bool {
+        KEYS[self as usize].2 == COUNT
     }
 
     /// Whether two values are two choices, not the ends of a range.
     fn is_listed(self) -> bool {
-        match self {
-            Self::Wire | Self::Rows | Self::Columns => true,
-            Self::InnerDiameter
-            | Self::OuterDiameter
-            | Self::Length
-            | Self::Clearance
-            | Self::Above
-            | Self::Below
-            | Self::PlateThickness
-            | Self::PlateX
-            | Self::PlateY
-            | Self::PlateDiameter
-            | Self::PlateGap
-            | Self::Pitch
-            | Self::Move
-            | Self::Height => false,
-        }
+        self.is_count() || self == Self::Wire
     }
 }
 
@@ -337,8 +258,7 @@ fn add(
         }
         return;
     }
-    if matches!(key, SearchKey::Rows | SearchKey::Columns) && list.iter().any(|v| v.fract() != 0.0)
-    {
+    if key.is_count() && list.iter().any(|v| v.fract() != 0.0) {
         s.fault(name, "expected whole numbers", "as in rows = [3, 4, 5]");
     }
     list.sort_by(f64::total_cmp);
@@ -346,4 +266,16 @@ fn add(
         s.fault(name, TWICE, ONCE);
     }
     space.keys.push((key, SearchValues::Listed(list)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_has_its_own_row() {
+        for (index, (key, path, _)) in KEYS.iter().enumerate() {
+            assert_eq!(*key as usize, index, "{path}");
+        }
+    }
 }

@@ -5,7 +5,6 @@
 //! not computed. What is read is what was computed, to the bit.
 
 use std::fmt;
-use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::Serialize;
@@ -14,6 +13,7 @@ use serde::de::DeserializeOwned;
 use super::Scene;
 use super::maps::{MagnetMean, SceneMap};
 use super::passive;
+use super::shard::Shard;
 use super::steel::{self, Solved};
 use crate::RunError;
 use crate::bundle::artefact::Input;
@@ -168,16 +168,11 @@ impl FieldStore {
         Ok(solved)
     }
 
-    /// Solves a part of the drives of the coupled cores of `scene`, which `part` chooses by the number of
-    /// their blocks, for [`FieldStore::steel`] to find.
+    /// Solves `shard` of the blocks of drives of the coupled cores of `scene`, for [`FieldStore::steel`] to find.
     ///
     /// # Errors
     /// As [`steel::solve`]; a design whose drives are not solved in blocks; a cache that cannot be written.
-    pub fn steel_part(
-        &self,
-        scene: &Scene,
-        part: impl FnOnce(u64) -> Result<Range<u64>, String>,
-    ) -> Result<SteelPart, RunError> {
+    pub fn steel_part(&self, scene: &Scene, shard: Shard) -> Result<SteelPart, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
         let Some(request) = steel::in_blocks(scene, scene.tolerances.map, lowest_m)? else {
             return Err(RunError::Input(format!(
@@ -186,7 +181,7 @@ impl FieldStore {
             )));
         };
         let blocks = request.blocks();
-        let numbers = part(blocks as u64).map_err(RunError::Input)?;
+        let numbers = shard.of(blocks as u64);
         let numbers = numbers.start as usize..numbers.end as usize;
         let of = numbers.len();
         if self.holds_steel() {

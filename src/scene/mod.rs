@@ -18,6 +18,7 @@ pub mod passive_map;
 mod passive_table;
 mod prepared_field;
 pub mod rated;
+pub mod shard;
 pub mod single;
 pub mod sources;
 pub mod steel;

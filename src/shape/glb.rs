@@ -127,26 +127,15 @@ fn children(node: &Node<'_>, meshes: usize) -> Vec<(usize, Affine)> {
     own.into_iter().chain(nodes).collect()
 }
 
-/// Adds a primitive's triangles.
-///
-/// Long because every way of listing triangles is one arm of it.
-fn triangles(
-    primitive: &gltf::Primitive<'_>,
-    blob: &[u8],
-    triangles: &mut Vec<Triangle>,
-) -> Result<(), String> {
-    let fans = match primitive.mode() {
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => primitive.mode(),
-        // Points and lines are no surface.
-        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
-    };
-    let missing = || {
-        "the GLB file holds a mesh whose data are missing, compressed or in another \
-         file: save it again as one file without compression (Draco, meshopt)"
-            .to_owned()
-    };
-    let positions = primitive.get(&Semantic::Positions).ok_or_else(missing)?;
-    let held = |accessor: &gltf::Accessor<'_>| {
+fn missing() -> String {
+    "the GLB file holds a mesh whose data are missing, compressed or in another \
+     file: save it again as one file without compression (Draco, meshopt)"
+        .to_owned()
+}
+
+/// Checks that an accessor's numbers lie within the file.
+fn check_held(accessor: &gltf::Accessor<'_>, blob: &[u8]) -> Result<(), String> {
+    let held = || {
         let view = accessor.view()?;
         let in_file = matches!(view.buffer().source(), gltf::buffer::Source::Bin);
         let end = view.offset().checked_add(view.length())?;
@@ -159,7 +148,16 @@ fn triangles(
         (in_file && end <= blob.len() && reach <= view.length() && stride >= accessor.size())
             .then_some(())
     };
-    held(&positions).ok_or_else(missing)?;
+    held().ok_or_else(missing)
+}
+
+/// A primitive's points and the indices of its corners.
+fn points_and_indices(
+    primitive: &gltf::Primitive<'_>,
+    blob: &[u8],
+) -> Result<(Vec<[f64; 3]>, Vec<u32>), String> {
+    let positions = primitive.get(&Semantic::Positions).ok_or_else(missing)?;
+    check_held(&positions, blob)?;
     if (positions.data_type(), positions.dimensions()) != (DataType::F32, Dimensions::Vec3) {
         return Err("the GLB file holds positions that are not three floats each".into());
     }
@@ -175,24 +173,34 @@ fn triangles(
     if points.as_flattened().iter().any(|c| !c.is_finite()) {
         return Err("a position is not a finite number; repair the mesh".into());
     }
-    let indices: Vec<u32> = match primitive.indices() {
-        None => (0..points.len() as u32).collect(),
-        Some(accessor) => {
-            held(&accessor).ok_or_else(missing)?;
-            let whole = matches!(
-                accessor.data_type(),
-                DataType::U8 | DataType::U16 | DataType::U32
-            );
-            if !whole || accessor.dimensions() != Dimensions::Scalar {
-                return Err("the GLB file holds indices that are not whole numbers".into());
-            }
-            reader
-                .read_indices()
-                .ok_or_else(missing)?
-                .into_u32()
-                .collect()
-        }
+    let Some(accessor) = primitive.indices() else {
+        let in_order = (0..points.len() as u32).collect();
+        return Ok((points, in_order));
     };
+    check_held(&accessor, blob)?;
+    let whole = matches!(
+        accessor.data_type(),
+        DataType::U8 | DataType::U16 | DataType::U32
+    );
+    if !whole || accessor.dimensions() != Dimensions::Scalar {
+        return Err("the GLB file holds indices that are not whole numbers".into());
+    }
+    let indices = reader.read_indices().ok_or_else(missing)?;
+    Ok((points, indices.into_u32().collect()))
+}
+
+/// Adds a primitive's triangles.
+fn triangles(
+    primitive: &gltf::Primitive<'_>,
+    blob: &[u8],
+    triangles: &mut Vec<Triangle>,
+) -> Result<(), String> {
+    let fans = match primitive.mode() {
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => primitive.mode(),
+        // Points and lines are no surface.
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
+    };
+    let (points, indices) = points_and_indices(primitive, blob)?;
     let mut add = |a: u32, b: u32, c: u32| -> Result<(), String> {
         let mut triangle = [[0.0; 3]; 3];
         for (slot, index) in triangle.iter_mut().zip([a, b, c]) {

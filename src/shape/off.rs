@@ -19,28 +19,81 @@ pub(crate) fn begins(bytes: &[u8]) -> bool {
     HEADS.iter().any(|head| first == Some(*head))
 }
 
+/// A line's number and words.
+type Line<'a> = (usize, Vec<&'a [u8]>);
+
+/// The lines of a file without comments and blank ones.
+struct Rest<'a>(Lines<'a>);
+
+impl<'a> Rest<'a> {
+    /// The next line.
+    ///
+    /// # Errors
+    /// [`ReadError`] at the end.
+    fn next(&mut self) -> Result<Line<'a>, ReadError> {
+        loop {
+            fluxform_base::progress::poll();
+            let Some(line) = self.0.next_line() else {
+                let what = "the OFF file ends before its last face: it was cut short";
+                return Err(ReadError::file(what));
+            };
+            let words: Vec<&[u8]> = line.words().collect();
+            if !words.is_empty() {
+                return Ok((line.number, words));
+            }
+        }
+    }
+}
+
 /// Reads an OFF file's bytes.
 ///
 /// # Errors
 /// [`ReadError`] with the line: counts that the file does not hold, a number or an index that is
 /// none, no face.
-///
-/// Long because the file is one pass over its sections, each of which needs the counts before it.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let bytes = narrow(bytes);
-    let mut lines = Lines::new(&bytes);
-    // Without comments and blank lines; the head may be followed by the counts.
-    let mut next = move || loop {
-        fluxform_base::progress::poll();
-        let line = lines.next_line()?;
-        let words: Vec<&[u8]> = line.words().collect();
-        if !words.is_empty() {
-            return Some((line.number, words));
+    let mut rest = Rest(Lines::new(&bytes));
+    let [vertices, faces] = counts(&bytes, &mut rest)?;
+    let mut numbers = Numbers::default();
+    let mut points = Vec::with_capacity(vertices);
+    for _ in 0..vertices {
+        let (number, words) = rest.next()?;
+        let as_fault = |what: String| ReadError::new(Place::Line(number), what);
+        let [x, y, z, ..] = words[..] else {
+            return Err(as_fault(
+                "a vertex has three coordinates; here are fewer".into(),
+            ));
+        };
+        let mut point = [0.0; 3];
+        for (slot, word) in point.iter_mut().zip([x, y, z]) {
+            *slot = numbers.read(word).map_err(as_fault)?;
         }
-    };
-    let ends = || ReadError::file("the OFF file ends before its last face: it was cut short");
-    let (number, mut words) = next().ok_or_else(ends)?;
-    if !begins(&bytes) || starts(words.get(1).unwrap_or(&&b""[..]), b"BINARY") {
+        points.push(point);
+    }
+    let mut all = Faces::default();
+    for _ in 0..faces {
+        add_face(&mut all, vertices, &mut rest)?;
+    }
+    let place =
+        |(line, _)| ReadError::new(Place::Line(line), "a face has an index without a vertex");
+    let (triangles, _) = all.cut(&points).map_err(place)?;
+    if triangles.is_empty() {
+        let what = format!(
+            "the OFF file holds {vertices} vertices and no face: there is no surface, only points"
+        );
+        return Err(ReadError::file(what));
+    }
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: numbers.rounding(),
+        ..FileMesh::default()
+    })
+}
+
+/// The numbers of vertices and faces, after the head or on the line below it.
+fn counts(bytes: &[u8], rest: &mut Rest<'_>) -> Result<[usize; 2], ReadError> {
+    let (number, mut words) = rest.next()?;
+    if !begins(bytes) || starts(words.get(1).unwrap_or(&&b""[..]), b"BINARY") {
         let what = format!(
             "expected an OFF file in ASCII, which begins with `OFF`, found `{}`",
             shown(words[0])
@@ -49,7 +102,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     }
     words.remove(0);
     let (number, words) = match words.is_empty() {
-        true => next().ok_or_else(ends)?,
+        true => rest.next()?,
         false => (number, words),
     };
     let counts: Vec<usize> = words.iter().map_while(|word| whole(word)).collect();
@@ -69,64 +122,37 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         );
         return Err(ReadError::new(Place::Line(number), what));
     }
-    let mut numbers = Numbers::default();
-    let mut points = Vec::with_capacity(vertices);
-    for _ in 0..vertices {
-        let (number, words) = next().ok_or_else(ends)?;
-        let as_fault = |what: String| ReadError::new(Place::Line(number), what);
-        let [x, y, z, ..] = words[..] else {
-            return Err(as_fault(
-                "a vertex has three coordinates; here are fewer".into(),
-            ));
-        };
-        let mut point = [0.0; 3];
-        for (slot, word) in point.iter_mut().zip([x, y, z]) {
-            *slot = numbers.read(word).map_err(as_fault)?;
-        }
-        points.push(point);
+    Ok([vertices, faces])
+}
+
+/// Adds the next face, of corners among `vertices`.
+fn add_face(all: &mut Faces, vertices: usize, rest: &mut Rest<'_>) -> Result<(), ReadError> {
+    let (number, mut words) = rest.next()?;
+    let as_fault = |what: String| ReadError::new(Place::Line(number), what);
+    let corners = whole(words[0]).filter(|corners| *corners <= MOST_CORNERS);
+    // Some programs break a face over lines.
+    while corners.is_some_and(|corners| words.len() <= corners) {
+        words.extend(rest.next()?.1);
     }
-    let mut all = Faces::default();
-    for _ in 0..faces {
-        let (number, mut words) = next().ok_or_else(ends)?;
-        let as_fault = |what: String| ReadError::new(Place::Line(number), what);
-        let corners = whole(words[0]).filter(|corners| *corners <= MOST_CORNERS);
-        // Some programs break a face over lines.
-        while corners.is_some_and(|corners| words.len() <= corners) {
-            words.extend(next().ok_or_else(ends)?.1);
-        }
-        let indices = corners.and_then(|corners| words.get(1..=corners));
-        let indices = indices.ok_or_else(|| {
+    let indices = corners.and_then(|corners| words.get(1..=corners));
+    let indices = indices.ok_or_else(|| {
+        as_fault(format!(
+            "expected a face's number of corners, at most {MOST_CORNERS}, and as many indices"
+        ))
+    })?;
+    for word in indices {
+        let index = whole(word).filter(|index| *index < vertices);
+        let index = index.ok_or_else(|| {
             as_fault(format!(
-                "expected a face's number of corners, at most {MOST_CORNERS}, and as many indices"
+                "a face has the index `{}`, but the file has {vertices} vertices (indices \
+                 count from 0)",
+                shown(word)
             ))
         })?;
-        for word in indices {
-            let index = whole(word).filter(|index| *index < vertices);
-            let index = index.ok_or_else(|| {
-                as_fault(format!(
-                    "a face has the index `{}`, but the file has {vertices} vertices (indices \
-                     count from 0)",
-                    shown(word)
-                ))
-            })?;
-            all.push_index(index as u32);
-        }
-        all.end_face(number);
+        all.push_index(index as u32);
     }
-    let place =
-        |(line, _)| ReadError::new(Place::Line(line), "a face has an index without a vertex");
-    let (triangles, _) = all.cut(&points).map_err(place)?;
-    if triangles.is_empty() {
-        let what = format!(
-            "the OFF file holds {vertices} vertices and no face: there is no surface, only points"
-        );
-        return Err(ReadError::file(what));
-    }
-    Ok(FileMesh {
-        triangles,
-        coordinate_rounding: numbers.rounding(),
-        ..FileMesh::default()
-    })
+    all.end_face(number);
+    Ok(())
 }
 
 fn whole(word: &[u8]) -> Option<usize> {

@@ -260,8 +260,6 @@ pub fn discretize_with(
 ///
 /// # Errors
 /// As [`discretize_with`].
-///
-/// Long because every step uses what the steps before it made.
 pub fn discretize_surface(
     document: &ShapeDocument,
     (surface, mut warnings): (&Surface, Vec<String>),
@@ -273,44 +271,23 @@ pub fn discretize_surface(
     let grid = requested_grid(document, &bounds)?;
     let mut samples = surface.heights(&grid, progress)?;
     let found = holes::holes(&grid, &samples);
-    if let Some(&first) = found.first() {
-        let [x_mm, y_mm] = [
-            grid.x_m.node(first % grid.x_m.samples) * 1000.0,
-            grid.y_m.node(first / grid.x_m.samples) * 1000.0,
-        ];
-        let what = format!(
-            "{} grid points inside the silhouette have no surface, the first at ({x_mm:.6}, \
-             {y_mm:.6}) mm",
-            found.len()
-        );
-        match settings.holes {
-            Holes::Error => {
-                return Err(ShapeError::Document(format!(
-                    "{what}; mend the surface, or choose --holes skip or --holes fill"
-                )));
-            }
-            Holes::Skip => warnings.push(format!("{what}: they give no points")),
-            Holes::Fill => {
-                holes::fill(&grid, &mut samples, &found);
-                warnings.push(format!("{what}: heights were filled in from around them"));
-            }
-        }
+    if !found.is_empty() {
+        warnings.push(treat_holes(settings.holes, &grid, &mut samples, &found)?);
     }
     let rounding_m = surface.coordinate_rounding_m();
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
-    let mut hidden = None;
-    if let (true, Some(known)) = (settings.marks, &settings.known.marked) {
-        hidden = known.hidden;
-        points.marks.clone_from(&known.marks);
-        points.area_m2.clone_from(&known.area_m2);
-        points.fine = known.fine.clone();
-    } else if settings.marks {
-        let probe = Probe::new(surface, &points.grid);
-        mark(&mut points, &probe, &found, progress)?;
-        (points.area_m2, points.fine) = point_areas_m2(&points, &probe, progress)?;
-        hidden = Hidden::of(surface);
-    }
+    let hidden = if settings.marks {
+        add_marks(
+            &mut points,
+            surface,
+            settings.known.marked.as_ref(),
+            &found,
+            progress,
+        )?
+    } else {
+        None
+    };
     if let Some(share) = hidden
         .map(|hidden| hidden.of_upward)
         .filter(|s| *s > MOST_HIDDEN)
@@ -321,42 +298,20 @@ pub fn discretize_surface(
             100.0 * share
         ));
     }
-    let (mut how, seconds) = (settings.certify, settings.certify_seconds);
-    if how != Certify::No && grid.len() > MOST_CERTIFIED {
-        how = Certify::No;
-        warnings.push(format!(
-            "the grid has more than {MOST_CERTIFIED} points: how far it departs from the surface \
-             between them is not computed"
-        ));
-    }
-    let certificate = match &settings.known.certificate {
-        Some(known) if how != Certify::No => Some(known.clone()),
-        _ => certify(surface, &grid, &samples, how, seconds, progress)?,
-    };
-    if how != Certify::No && certificate.is_none() {
-        warnings.push(
-            "the effort of a certificate is spent: so many triangles lie over each other that how \
-             far the points depart from the surface between them is not computed; the heights are \
-             exact all the same (--certify-seconds grants more; or repair or coarsen the mesh)"
-                .into(),
-        );
-    }
+    let certificate = certified(surface, &grid, &samples, settings, &mut warnings, progress)?;
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
-        by_cell(surface, &grid, &samples, seconds, progress)?
+        by_cell(surface, &grid, &samples, settings.certify_seconds, progress)?
     } else {
         None
     };
-    let read_by = match surface {
-        Surface::Mesh(mesh) => mesh.read_by().map(str::to_owned),
-        Surface::Primitive(_) => None,
-    };
-    let (mesh, method) = match surface {
+    let (mesh, read_by, method) = match surface {
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
+            mesh.read_by().map(str::to_owned),
             "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
              multiplies it; the tessellation's own deviation is not in the file)",
         ),
-        Surface::Primitive(_) => (None, "a-priori: a closed formula in double precision"),
+        Surface::Primitive(_) => (None, None, "a-priori: a closed formula in double precision"),
     };
     let accuracy = StageAccuracy {
         estimate: rounding_m,
@@ -374,6 +329,90 @@ pub fn discretize_surface(
         hidden,
         warnings,
     })
+}
+
+/// Refuses the holes at the grid indices `found`, leaves them or fills them, and says so.
+fn treat_holes(
+    how: Holes,
+    grid: &Grid,
+    samples: &mut [Option<Sample>],
+    found: &[usize],
+) -> Result<String, ShapeError> {
+    let [x_mm, y_mm] = [
+        grid.x_m.node(found[0] % grid.x_m.samples) * 1000.0,
+        grid.y_m.node(found[0] / grid.x_m.samples) * 1000.0,
+    ];
+    let what = format!(
+        "{} grid points inside the silhouette have no surface, the first at ({x_mm:.6}, \
+         {y_mm:.6}) mm",
+        found.len()
+    );
+    match how {
+        Holes::Error => Err(ShapeError::Document(format!(
+            "{what}; mend the surface, or choose --holes skip or --holes fill"
+        ))),
+        Holes::Skip => Ok(format!("{what}: they give no points")),
+        Holes::Fill => {
+            holes::fill(grid, samples, found);
+            Ok(format!("{what}: heights were filled in from around them"))
+        }
+    }
+}
+
+/// Adds flags, areas and finer points, those of `known` where they were computed before; the area that no
+/// height map shows.
+fn add_marks(
+    points: &mut ConstraintPoints,
+    surface: &Surface,
+    known: Option<&Marked>,
+    found: &[usize],
+    progress: &dyn Progress,
+) -> Result<Option<Hidden>, ShapeError> {
+    if let Some(known) = known {
+        points.marks.clone_from(&known.marks);
+        points.area_m2.clone_from(&known.area_m2);
+        points.fine = known.fine.clone();
+        return Ok(known.hidden);
+    }
+    let probe = Probe::new(surface, &points.grid);
+    mark(points, &probe, found, progress)?;
+    (points.area_m2, points.fine) = point_areas_m2(points, &probe, progress)?;
+    Ok(Hidden::of(surface))
+}
+
+/// The certificate that `settings` request, where the grid and the effort allow it.
+fn certified(
+    surface: &Surface,
+    grid: &Grid,
+    samples: &[Option<Sample>],
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Option<Certificate>, ShapeError> {
+    if settings.certify == Certify::No {
+        return Ok(None);
+    }
+    if grid.len() > MOST_CERTIFIED {
+        warnings.push(format!(
+            "the grid has more than {MOST_CERTIFIED} points: how far it departs from the surface \
+             between them is not computed"
+        ));
+        return Ok(None);
+    }
+    let (how, seconds) = (settings.certify, settings.certify_seconds);
+    let certificate = match &settings.known.certificate {
+        Some(known) => Some(known.clone()),
+        None => certify(surface, grid, samples, how, seconds, progress)?,
+    };
+    if certificate.is_none() {
+        warnings.push(
+            "the effort of a certificate is spent: so many triangles lie over each other that how \
+             far the points depart from the surface between them is not computed; the heights are \
+             exact all the same (--certify-seconds grants more; or repair or coarsen the mesh)"
+                .into(),
+        );
+    }
+    Ok(certificate)
 }
 
 /// Finds the flags of each point; `filled` holds grid indices, ascending.

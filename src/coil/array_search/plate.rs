@@ -3,20 +3,14 @@
 use fluxform_design::iron::{Plate, PlateOutline};
 use fluxform_design::search::SearchKey;
 
-/// The keys of a plate, and their names in a design.
-pub(super) const KEYS: [(SearchKey, &str); 5] = [
-    (SearchKey::PlateThickness, "plate.thickness_mm"),
-    (SearchKey::PlateX, "plate.x_mm"),
-    (SearchKey::PlateY, "plate.y_mm"),
-    (SearchKey::PlateDiameter, "plate.diameter_mm"),
-    (SearchKey::PlateGap, "plate.gap_mm"),
+/// The keys of a plate.
+pub(super) const KEYS: [SearchKey; 5] = [
+    SearchKey::PlateThickness,
+    SearchKey::PlateX,
+    SearchKey::PlateY,
+    SearchKey::PlateDiameter,
+    SearchKey::PlateGap,
 ];
-
-/// The name of one of the [`KEYS`].
-pub(super) fn name(key: SearchKey) -> &'static str {
-    let known = KEYS.iter().find(|(known, _)| *known == key);
-    known.map_or("plate", |(_, name)| name)
-}
 
 fn length_of(plate: &mut Plate, key: SearchKey) -> Option<&mut f64> {
     match (key, &mut plate.outline) {

@@ -43,19 +43,19 @@ impl Axis {
     #[must_use]
     pub fn key(self) -> String {
         let key = match self {
-            Self::Bore => "coil.inner_diameter_mm",
-            Self::Layers => "layers",
-            Self::TurnsPerLayer => "turns_per_layer",
-            Self::Wire => "wire.diameter_mm",
-            Self::Clearance => "core.clearance_mm",
-            Self::Above => "core.above_mm",
-            Self::Below => "core.below_mm",
-            Self::Plate(key) => plate::name(key),
-            Self::Pitch => "array.pitch_mm",
+            Self::Bore => SearchKey::InnerDiameter,
+            Self::Layers => return "layers".to_owned(),
+            Self::TurnsPerLayer => return "turns_per_layer".to_owned(),
+            Self::Wire => SearchKey::Wire,
+            Self::Clearance => SearchKey::Clearance,
+            Self::Above => SearchKey::Above,
+            Self::Below => SearchKey::Below,
+            Self::Plate(key) => key,
+            Self::Pitch => SearchKey::Pitch,
             Self::Move(group) => return format!("array.move_{}_mm", group + 1),
-            Self::Height => "shapes.height_mm",
+            Self::Height => SearchKey::Height,
         };
-        key.to_owned()
+        key.path().to_owned()
     }
 }
 
@@ -375,7 +375,7 @@ impl Space {
         if let (true, true, None) = (self.axes.is_empty(), search.without_plate, &self.base.plate)
             && let Some((key, values)) = plate::KEYS
                 .iter()
-                .find_map(|(key, _)| Some((*key, search.values(*key)?)))
+                .find_map(|key| Some((*key, search.values(*key)?)))
         {
             self.push(Axis::Plate(key), values);
         }
@@ -383,7 +383,7 @@ impl Space {
     }
 
     fn add_plate(&mut self, search: &SearchSpace) -> Result<(), String> {
-        for (key, name) in plate::KEYS {
+        for key in plate::KEYS {
             let Some(values) = search.values(key) else {
                 continue;
             };
@@ -392,13 +392,15 @@ impl Space {
                     continue;
                 }
                 return Err(format!(
-                    "[search] varies {name}, but the design has no plate: add [plate], or leave the key out"
+                    "[search] varies {}, but the design has no plate: add [plate], or leave the key out",
+                    key.path()
                 ));
             };
             if plate::length_m(plate, key).is_none() {
                 return Err(format!(
-                    "[search] varies {name}, which the design's plate has not: one with sides has x_mm and y_mm, a \
-                     round one diameter_mm"
+                    "[search] varies {}, which the design's plate has not: one with sides has x_mm and y_mm, a \
+                     round one diameter_mm",
+                    key.path()
                 ));
             }
             self.push(Axis::Plate(key), values);
@@ -705,9 +707,9 @@ impl Space {
         if self.base.plate.is_some() {
             let design = self.design(x);
             let plate = design.plate.as_ref();
-            set.extend(plate::KEYS.iter().filter_map(|(key, name)| {
+            set.extend(plate::KEYS.iter().filter_map(|key| {
                 let length_m = plate::length_m(plate?, *key)?;
-                Some((*name, number(mm(length_m))))
+                Some((key.path(), number(mm(length_m))))
             }));
         } else {
             remove.push("plate");

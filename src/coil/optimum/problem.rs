@@ -11,7 +11,7 @@ use super::model::{CoilModel, Sloped, Strand, Window};
 use super::sqp::{Local, Point, Smooth};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
 pub use crate::limits::LimitName;
-use crate::limits::{LIMITS, bobbin_bore_m};
+use crate::limits::{CoilQuantity, LIMITS, bobbin_bore_m};
 use fluxform_design::Limits;
 
 /// Dimensions that are given, not sought; diameters and length in m.
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         add(LimitName::FixedInner, fixed.inner_diameter_m);
         add(LimitName::FixedOuter, fixed.outer_diameter_m);
         add(LimitName::FixedLength, fixed.length_m);
-        for limit in LIMITS.iter().filter(|limit| !limit.of_array) {
+        for limit in LIMITS.iter().filter(|limit| limit.quantity.is_some()) {
             // A least bore of zero is the axis.
             let (name, set) = match limit.name {
                 LimitName::InnerDiameter => (limit.name, task.bore_min_m(&strand)),
@@ -272,46 +272,32 @@ impl<'a> Problem<'a> {
             value,
             slope: [slope[0], slope[1], slope[2], 0.0],
         };
-        let values = self
-            .bounds
-            .iter()
-            .map(|bound| match bound.name {
-                LimitName::Resistance => resistance,
-                LimitName::Settling => ratio(response.inductance_h.along(current), resistance)
-                    .times(SETTLING_TIME_CONSTANTS),
-                LimitName::OuterDiameter | LimitName::FixedOuter | LimitName::Pitch => {
-                    along(2.0 * window.outer_radius_m(), [2.0, 2.0, 0.0])
-                }
-                LimitName::InnerDiameter | LimitName::FixedInner | LimitName::Axis => {
-                    along(2.0 * window.inner_radius_m, [2.0, 0.0, 0.0])
-                }
-                LimitName::Length | LimitName::FixedLength | LimitName::OneTurn => {
-                    along(window.length_m, [0.0, 0.0, 1.0])
-                }
-                LimitName::OneLayer => along(window.depth_m, [0.0, 1.0, 0.0]),
-                LimitName::WindingFill => along(1.0, [0.0; 3]),
-                LimitName::Power => product(product(current, current), resistance),
-                LimitName::Mass => {
-                    let mut sum = volume.times(self.strand.mass_per_volume());
-                    sum.value += response.core_mass_kg.value;
-                    let slopes = sum.slope.iter_mut().zip(response.core_mass_kg.slope);
-                    slopes.for_each(|(slope, by_core)| *slope += by_core);
-                    sum
-                }
-                LimitName::WireLength => volume.times(self.strand.length_per_volume()),
-                LimitName::CoreField => response.core_field_t.along(current),
-                LimitName::Voltage => product(current, resistance),
-                LimitName::Current => current,
-                // Never among the bounds: one coil does not decide them.
-                LimitName::Footprint
-                | LimitName::ArrayPower
-                | LimitName::StaticPower
-                | LimitName::FeedbackPower
-                | LimitName::ArrayMass
-                | LimitName::ArraySettling
-                | LimitName::ArrayCost => along(f64::NAN, [0.0; 3]),
-            })
-            .collect();
+        let value = |quantity| match quantity {
+            CoilQuantity::Resistance => resistance,
+            CoilQuantity::Settling => ratio(response.inductance_h.along(current), resistance)
+                .times(SETTLING_TIME_CONSTANTS),
+            CoilQuantity::OuterDiameter => along(2.0 * window.outer_radius_m(), [2.0, 2.0, 0.0]),
+            CoilQuantity::InnerDiameter => along(2.0 * window.inner_radius_m, [2.0, 0.0, 0.0]),
+            CoilQuantity::Length => along(window.length_m, [0.0, 0.0, 1.0]),
+            CoilQuantity::Depth => along(window.depth_m, [0.0, 1.0, 0.0]),
+            CoilQuantity::WindingFill => along(1.0, [0.0; 3]),
+            CoilQuantity::Power => product(product(current, current), resistance),
+            CoilQuantity::Mass => {
+                let mut sum = volume.times(self.strand.mass_per_volume());
+                sum.value += response.core_mass_kg.value;
+                let slopes = sum.slope.iter_mut().zip(response.core_mass_kg.slope);
+                slopes.for_each(|(slope, by_core)| *slope += by_core);
+                sum
+            }
+            CoilQuantity::WireLength => volume.times(self.strand.length_per_volume()),
+            CoilQuantity::CoreField => response.core_field_t.along(current),
+            CoilQuantity::Voltage => product(current, resistance),
+            CoilQuantity::Current => current,
+        };
+        let bounds = self.bounds.iter();
+        let values = bounds
+            .map(|bound| bound.name.limit().quantity.map(value))
+            .collect::<Option<_>>()?;
         Some(Rated {
             window,
             current_a: current.value,

@@ -26,10 +26,10 @@ use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
-use crate::commands::sweep::run::Part;
 use crate::design::Need;
 use crate::scene::cached_field::SteelPart;
 use crate::scene::cost::{Components, of_map, of_steel};
+use crate::scene::shard::Shard;
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::ErrorTarget;
 
@@ -82,10 +82,10 @@ pub struct Calibrate {
         long,
         hide_short_help = true,
         value_name = "I/N",
-        value_parser = Part::shard,
+        value_parser = Shard::parse,
         conflicts_with_all = ["no_cache", "explain"]
     )]
-    shard: Option<Part>,
+    shard: Option<Shard>,
     /// Report the plan and its cost first
     ///
     /// With the reason for every part that is left out, and the error that this costs.
@@ -215,7 +215,7 @@ struct ShardSummary<'a> {
 /// One part of the drives, and what was done.
 fn solve_shard(
     source: DesignSource,
-    shard: Part,
+    shard: Shard,
     options: &CalibrateOptions,
     printer: &Printer,
 ) -> Result<(), Failure> {

@@ -12,7 +12,6 @@ use super::lambda::placement::Placed;
 use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
-use super::sweep::run::Part;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
@@ -41,6 +40,7 @@ use crate::scene::named_files::NamedContent;
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
+use crate::scene::shard::Shard;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
 use crate::shape::points::ConstraintPoints;
@@ -292,14 +292,14 @@ pub fn run(
 /// As [`FieldStore::steel_part`]; interruption.
 pub fn run_shard(
     source: DesignSource,
-    shard: Part,
+    shard: Shard,
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<SteelPart, RunError> {
     let tolerance = options.lambda.tolerance_for(source.design);
     let scene = Scene::with_tolerance(source.design, tolerance)?;
     progress.begin("steel", 1);
-    let part = field_store(&scene, options).steel_part(&scene, |blocks| shard.indices(blocks))?;
+    let part = field_store(&scene, options).steel_part(&scene, shard)?;
     progress.end();
     Ok(part)
 }

@@ -19,7 +19,7 @@ use crate::cli::layout::Sheet;
 use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, length_error, mm, number, percent};
-use crate::cli::start::begin;
+use crate::cli::start::{begin, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::scene::cost::of_points;
 use crate::shape::certificate::Certify;
@@ -216,16 +216,11 @@ impl Discretize {
         csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
     ) -> Result<Option<Stream>, Failure> {
         match &self.out {
-            FileArgument::Standard => {
-                printer.data(|out| csv(out))?;
-                Ok(Some(Stream::Error))
-            }
-            FileArgument::Path(path) if atomic::is_stream(path) => {
+            FileArgument::Path(path) if !atomic::is_stream(path) => Ok(None),
+            out => {
                 let overwrite = Overwrite::same_bytes(self.writing.force, inputs);
-                atomic::write(path, &overwrite, |out| csv(out)).map_err(RunError::from)?;
-                Ok(Some(Stream::Output))
+                write_to(Some(out), &overwrite, printer, csv).map(Some)
             }
-            FileArgument::Path(_) => Ok(None),
         }
     }
 

@@ -11,7 +11,7 @@ use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::limits::{label, limit_row};
+use crate::cli::limits::limit_row;
 use crate::cli::pictures;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_with_error};
@@ -20,6 +20,7 @@ use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::limits::of_shapes;
 use crate::design::{Design, Need};
+use crate::report::limits::label;
 use crate::scene::cost::of_steel;
 use crate::scene::field_slice;
 use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
@@ -108,7 +109,7 @@ impl Evaluate {
                 .limits
                 .iter()
                 .filter(|(_, check)| !check.met)
-                .map(|(name, _)| label(name).to_owned())
+                .map(|(name, _)| label(name))
                 .collect();
             let message = format!("limits that are not met: {}", unmet.join(", "));
             return Err(Failure::Unmet(Wish::Limits, message));

@@ -3,20 +3,20 @@
 use super::text;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::array::command::{ArrayFlags, Shared, mark};
-use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
+use super::{Dimension, Document, OptimizeRequest, optimize, page};
 use crate::RunError;
-use crate::bundle::atomic::{Overwrite, check_distinct, write};
+use crate::bundle::atomic::{Overwrite, check_distinct};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::start::{accuracy_check, begin};
-use crate::cli::values::FileArgument;
+use crate::cli::start::{accuracy_check, begin, write_to};
+use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
 
 /// Find the best coil within a design's limits
@@ -57,8 +57,8 @@ pub struct Optimize {
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
-    #[arg(long, hide_short_help = true, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
-    fix: Vec<Key>,
+    #[arg(long, hide_short_help = true, value_name = "KEY", value_parser = values::named::<Dimension>(), num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
+    fix: Vec<Dimension>,
     /// Boxes of coils that proving the best may take; 0 for no proof
     #[arg(
         long,
@@ -79,20 +79,6 @@ pub struct Optimize {
     tolerance: Tolerance,
     #[command(flatten)]
     array: ArrayFlags,
-}
-
-/// A dimension that keeps the design's value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Key {
-    /// The bore
-    #[value(name = "inner_diameter_mm")]
-    InnerDiameter,
-    /// The outer diameter
-    #[value(name = "outer_diameter_mm")]
-    OuterDiameter,
-    /// The length
-    #[value(name = "length_mm")]
-    Length,
 }
 
 fn starts(text: &str) -> Result<usize, String> {
@@ -159,7 +145,16 @@ impl Optimize {
         for warning in &result.warnings {
             printer.warning(warning);
         }
-        let mut place = self.write(&result, &mark, &overwrite, printer)?;
+        let text = result
+            .design_text
+            .as_ref()
+            .map(|text| format!("{mark}\n{text}"));
+        let mut place = match &text {
+            Some(text) => write_to(self.out.as_ref(), &overwrite, printer, |out| {
+                out.write_all(text.as_bytes())
+            })?,
+            None => Stream::Output,
+        };
         if let Some(page) = &page {
             place = place.or(page.write(&result.inputs, &page::html(&result), printer)?);
         }
@@ -177,46 +172,16 @@ impl Optimize {
     }
 
     fn request(&self) -> OptimizeRequest {
-        let dimension = |key: &Key| match key {
-            Key::InnerDiameter => Dimension::InnerDiameter,
-            Key::OuterDiameter => Dimension::OuterDiameter,
-            Key::Length => Dimension::Length,
-        };
         OptimizeRequest {
             wound: self.wound,
             neighbours: self.neighbours,
-            fixed: self.fix.iter().map(dimension).collect(),
+            fixed: self.fix.clone(),
             starts: self.starts.unwrap_or(OptimizeRequest::default().starts),
             seed: self.seed,
             cells: self.certificate_cells,
             around: true,
             landscape: self.array.plot.is_some(),
             tolerance: self.tolerance.tolerance,
-        }
-    }
-
-    /// Writes the best coil's design where it was requested; returns where the summary goes.
-    fn write(
-        &self,
-        result: &Optimization,
-        mark: &str,
-        overwrite: &Overwrite,
-        printer: &Printer,
-    ) -> Result<Stream, Failure> {
-        let (Some(out), Some(text)) = (&self.out, &result.design_text) else {
-            return Ok(Stream::Output);
-        };
-        let text = format!("{mark}\n{text}");
-        match out {
-            FileArgument::Standard => {
-                printer.data(|out| out.write_all(text.as_bytes()))?;
-                Ok(Stream::Error)
-            }
-            FileArgument::Path(path) => {
-                write(path, overwrite, |out| out.write_all(text.as_bytes()))
-                    .map_err(RunError::from)?;
-                Ok(Stream::Output)
-            }
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod array;
 pub(crate) mod command;
+mod compared;
 mod design_document;
 mod model;
 mod no_coil;
@@ -14,6 +15,8 @@ use std::collections::BTreeMap;
 
 pub use design_document::Document;
 pub use result::*;
+
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
@@ -40,13 +43,18 @@ use crate::scene::{Scene, coupled};
 const NEIGHBOURS_AGREE: f64 = 1e-3;
 
 /// A dimension that may be given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumMessage, EnumString, IntoStaticStr, VariantArray,
+)]
 pub enum Dimension {
-    /// `coil.inner_diameter_mm`.
+    /// The bore
+    #[strum(serialize = "inner_diameter_mm")]
     InnerDiameter,
-    /// `coil.outer_diameter_mm`.
+    /// The outer diameter
+    #[strum(serialize = "outer_diameter_mm")]
     OuterDiameter,
-    /// `coil.length_mm`.
+    /// The length
+    #[strum(serialize = "length_mm")]
     Length,
 }
 
@@ -166,7 +174,7 @@ pub fn optimize(
         result.picture = landscape.map(|around| picture::picture(&around, best, &written.design));
         result.design_text = Some(written.text);
     }
-    result.take_given(given);
+    result.take_given(given, design);
     if has_iron {
         let alone = "one coil with its core alone is optimised: [plate] and [[iron]] stay in the design, but do not \
                      count; `optimize --for SHAPE` searches arrays with them";
@@ -306,11 +314,12 @@ impl Optimization {
     }
 
     /// The design's own coil, where it can be computed.
-    fn take_given(&mut self, given: Option<Result<Rated, RunError>>) {
+    fn take_given(&mut self, given: Option<Result<Rated, RunError>>, design: &Design) {
         match given {
             Some(Ok(rated)) => {
                 self.given = Some(GivenCoil {
                     coil: rated.coil,
+                    wire_diameter_m: design.wire.diameter_m,
                     force_n: rated.target.current_force_n(),
                     limits: rated.limits,
                 });

@@ -2,14 +2,15 @@
 
 use serde_json::{Map, Value};
 
-use super::result::{BestCoilSummary, GivenCoil, Objective, Optimization};
+use super::compared::{ComparedCoil, PROPERTIES, Property};
+use super::result::Optimization;
 use super::text::better;
 use crate::coil::optimum::LimitUse;
 use crate::coil::optimum::outcome::Alternative;
 use crate::report::frame::{Page, Section};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
-use crate::report::limits::{in_unit, words};
+use crate::report::limits::{in_unit, label, words};
 use crate::report::number::{count, figures, force, mm, percent, si};
 
 /// The result of `optimize` as one HTML page.
@@ -52,71 +53,14 @@ pub fn html(result: &Optimization) -> String {
     .html()
 }
 
-/// A row of the comparison: its name in artefacts, the best coil's number and the given one's.
-type Property = (
-    &'static str,
-    fn(&BestCoilSummary, &Objective) -> f64,
-    fn(&GivenCoil) -> Option<f64>,
-);
-
-const PROPERTIES: [Property; 11] = [
-    ("force_n", |_, o| o.force_n, |g| Some(g.force_n)),
-    (
-        "inner_diameter_m",
-        |c, _| c.size.inner_diameter_m,
-        |g| Some(g.coil.size.inner_diameter_m),
-    ),
-    (
-        "outer_diameter_m",
-        |c, _| c.size.outer_diameter_m,
-        |g| Some(g.coil.size.outer_diameter_m),
-    ),
-    (
-        "length_m",
-        |c, _| c.size.length_m,
-        |g| Some(g.coil.size.length_m),
-    ),
-    ("turns", |c, _| c.turns, |g| Some(g.coil.turns)),
-    ("wire_diameter_m", |c, _| c.wire_diameter_m, |_| None),
-    (
-        "resistance_ohm",
-        |c, _| c.circuit.resistance_ohm,
-        |g| Some(g.coil.circuit.resistance_ohm),
-    ),
-    (
-        "settling_s",
-        |c, _| c.circuit.settling_s,
-        |g| Some(g.coil.circuit.settling_s),
-    ),
-    (
-        "power_w",
-        |c, _| c.circuit.power_w,
-        |g| Some(g.coil.circuit.power_w),
-    ),
-    (
-        "mass_kg",
-        |c, _| c.circuit.mass_kg,
-        |g| Some(g.coil.circuit.mass_kg),
-    ),
-    (
-        "wire_length_m",
-        |c, _| c.circuit.wire_length_m,
-        |g| Some(g.coil.circuit.wire_length_m),
-    ),
-];
-
 fn answer(result: &Optimization) -> Section {
     let mut body = Html::default();
-    if let (Some(coil), Some(objective)) = (&result.coil, &result.objective) {
-        let row = |(name, best, given): Property| -> Vec<Cell> {
-            let (name, unit) = words(name);
-            let given = result.given.as_ref().and_then(given);
-            let given = given.map_or_else(|| "\u{2013}".to_owned(), |v| in_unit(v, unit));
-            vec![
-                name.into(),
-                in_unit(best(coil, objective), unit).into(),
-                given.into(),
-            ]
+    if let Some((best, given)) = result.compared() {
+        let row = |property: Property| -> Vec<Cell> {
+            let unit = words(property.0).1;
+            let cell = |coil: &ComparedCoil| in_unit(property.1(coil), unit);
+            let given = given.as_ref().map_or_else(|| "\u{2013}".to_owned(), cell);
+            vec![label(property.0).into(), cell(&best).into(), given.into()]
         };
         body.table(&Table {
             caption: "The best coil beside the design's own".to_owned(),

@@ -160,6 +160,9 @@ pub struct GivenCoil {
     /// The coil.
     #[serde(flatten)]
     pub coil: CoilSummary,
+    /// Diameter of its wire over the insulation, m.
+    #[serde(skip)]
+    pub wire_diameter_m: f64,
     /// Upward force of its rated current, N.
     pub force_n: f64,
     /// Its limits.

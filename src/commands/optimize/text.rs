@@ -1,18 +1,18 @@
 //! The summary of `optimize`.
 
+use super::compared::{ComparedCoil, PROPERTIES};
 use super::{BestCoilSummary, GivenCoil, Objective, Optimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::limits::{label, limit_row, limit_value};
+use crate::cli::limits::{limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
-use crate::coil::circuit::CoilSize;
 use crate::coil::limits::{LimitName, MANDREL_M, WIRES_A_MANDREL};
 use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{LimitUse, WholeTurns};
-use crate::scene::rated::CircuitSummary;
+use crate::report::limits::label;
 
 /// Most alternatives on screen; JSON has more.
 const SHOWN: usize = 6;
@@ -31,9 +31,9 @@ pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
     if let (Some(FileArgument::Path(path)), true) = (out, result.design_text.is_some()) {
         sheet.line("written to", &path.display().to_string());
     }
-    if let (Some(coil), Some(objective)) = (&result.coil, &result.objective) {
+    if let Some((best, given)) = result.compared() {
         sheet.gap();
-        sheet.raw(&beside(coil, objective, result.given.as_ref()));
+        sheet.raw(&beside(&best, given.as_ref()));
         if !result.limits.is_empty() {
             sheet.gap();
             sheet.raw(&limits(result));
@@ -269,55 +269,13 @@ fn sensitivity(used: &LimitUse) -> String {
     )
 }
 
-/// A row of the comparison: its name, its number of a coil and how it is shown.
-type Property = (&'static str, fn(&Column<'_>) -> String);
-
-/// The numbers of a coil that are compared.
-struct Column<'a> {
-    force_n: f64,
-    size: &'a CoilSize,
-    turns: f64,
-    circuit: &'a CircuitSummary,
-}
-
-const PROPERTIES: [Property; 11] = [
-    ("force", |of| force(of.force_n)),
-    ("inner diameter", |of| mm(of.size.inner_diameter_m)),
-    ("outer diameter", |of| mm(of.size.outer_diameter_m)),
-    ("length", |of| mm(of.size.length_m)),
-    ("turns", |of| number(of.turns)),
-    ("resistance", |of| si(of.circuit.resistance_ohm, "ohm")),
-    ("inductance", |of| si(of.circuit.inductance_h, "H")),
-    ("settling", |of| si(of.circuit.settling_s, "s")),
-    ("wire", |of| si(of.circuit.wire_length_m, "m")),
-    ("mass", |of| mass(of.circuit.mass_kg)),
-    ("heat", |of| si(of.circuit.power_w, "W")),
-];
-
-fn beside(best: &BestCoilSummary, objective: &Objective, given: Option<&GivenCoil>) -> String {
-    let mut columns = vec![(
-        "best",
-        Column {
-            force_n: objective.alone_force_n.unwrap_or(objective.force_n),
-            size: &best.size,
-            turns: best.turns,
-            circuit: &best.circuit,
-        },
-    )];
-    columns.extend(given.map(|given| {
-        let column = Column {
-            force_n: given.force_n,
-            size: &given.coil.size,
-            turns: given.coil.turns,
-            circuit: &given.coil.circuit,
-        };
-        ("as given", column)
-    }));
-    let head = columns.iter().map(|(name, _)| (*name).to_owned());
-    let mut rows = vec![std::iter::once(String::new()).chain(head).collect()];
-    rows.extend(PROPERTIES.map(|(name, shown)| {
-        let cells = columns.iter().map(|(_, column)| shown(column));
-        std::iter::once(name.to_owned()).chain(cells).collect()
+fn beside(best: &ComparedCoil, given: Option<&ComparedCoil>) -> String {
+    let mut rows = vec![vec![String::new(), "best".to_owned()]];
+    rows[0].extend(given.map(|_| "as given".to_owned()));
+    rows.extend(PROPERTIES.map(|(key, value)| {
+        let cell = |coil| limit_value(key, value(coil));
+        let cells = [best].into_iter().chain(given).map(cell);
+        std::iter::once(label(key)).chain(cells).collect()
     }));
     table(&[Side::Left, Side::Right, Side::Right], &rows)
 }

@@ -23,8 +23,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
-use crate::cli::start::accuracy_check;
-use crate::cli::start::begin;
+use crate::cli::start::{accuracy_check, begin, write_to};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::field::components::Components;
@@ -177,14 +176,7 @@ impl Probe {
                 summary.columns = Some(columns(&table)?);
                 Stream::Output
             }
-            FileArgument::Standard => {
-                printer.data(|out| table.write(out))?;
-                Stream::Error
-            }
-            FileArgument::Path(path) => {
-                atomic::write(path, &overwrite, |out| table.write(out)).map_err(RunError::from)?;
-                Stream::Output
-            }
+            out => write_to(Some(out), &overwrite, printer, |out| table.write(out))?,
         };
         let json = printer.with_warnings(&summary);
         printer.summary(place, &json, || self.text(&summary))?;

@@ -20,60 +20,6 @@ use crate::scene::sources::ShapeSource;
 /// The largest file that a plan names, bytes.
 const FILE_MAX_BYTES: u64 = 8 << 30;
 
-/// Which points of a plan are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// All of them.
-    Whole,
-    /// The `number`-th of `of` blocks, from 1; blocks differ by one point at most.
-    Shard {
-        /// From 1.
-        number: u64,
-        /// How many.
-        of: u64,
-    },
-    /// One point, from 0.
-    Index(u64),
-}
-
-impl Part {
-    /// Part I of N, given as I/N.
-    ///
-    /// # Errors
-    /// Anything else.
-    pub fn shard(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once('/').and_then(|(number, of)| {
-            let (number, of) = (number.parse::<u64>().ok()?, of.parse::<u64>().ok()?);
-            (1..=of).contains(&number).then_some((number, of))
-        });
-        match numbers {
-            Some((number, of)) => Ok(Self::Shard { number, of }),
-            None => Err("expected I/N, I from 1 to N, like 1/3".to_owned()),
-        }
-    }
-
-    /// Indices of the part's points among `points`. Blocks are contiguous, so that shards rarely
-    /// share a folder.
-    ///
-    /// # Errors
-    /// An index beyond the last point.
-    pub fn indices(self, points: u64) -> Result<Range<u64>, String> {
-        let start = |block: u64, of: u64| {
-            // No overflow, however many blocks.
-            (u128::from(points) * u128::from(block) / u128::from(of)) as u64
-        };
-        match self {
-            Self::Whole => Ok(0..points),
-            Self::Shard { number, of } => Ok(start(number - 1, of)..start(number, of)),
-            Self::Index(index) if index < points => Ok(index..index + 1),
-            Self::Index(index) => Err(format!(
-                "--index {index} is beyond the plan's last point, {}: they are counted from 0",
-                points - 1
-            )),
-        }
-    }
-}
-
 /// The counts of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunReport {
@@ -212,42 +158,4 @@ fn check_inputs(plan: &PlanFile, shapes: &[ShapeSource]) -> Result<(), RunError>
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shards_are_counted_from_one() {
-        assert_eq!(Part::shard("1/3"), Ok(Part::Shard { number: 1, of: 3 }));
-        assert_eq!(Part::shard("3/3"), Ok(Part::Shard { number: 3, of: 3 }));
-        for bad in ["0/3", "4/3", "1", "1/0", "a/b", "1/3/5", "-1/3"] {
-            assert!(Part::shard(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn shards_are_disjoint_and_complete() {
-        for points in [1u64, 7, 10, 1000, 100_000_000] {
-            for of in [1u64, 2, 3, 7, 13, u64::MAX] {
-                let shard = |number| Part::Shard { number, of }.indices(points).unwrap();
-                assert_eq!(shard(1).start, 0);
-                assert_eq!(shard(of).end, points);
-                for number in 1..of.min(20) {
-                    let (one, two) = (shard(number), shard(number + 1));
-                    assert_eq!(one.end, two.start);
-                    let lengths = (one.end - one.start).abs_diff(two.end - two.start);
-                    assert!(lengths <= 1);
-                }
-            }
-        }
-        assert_eq!(Part::Index(6).indices(7), Ok(6..7));
-        assert!(
-            Part::Index(7)
-                .indices(7)
-                .unwrap_err()
-                .contains("last point, 6")
-        );
-    }
 }

@@ -1,9 +1,11 @@
 //! `sweep run`: computes a plan's points, or a part of them.
 
+use std::ops::Range;
+
 use clap::Args;
 use serde::Serialize;
 
-use super::run::{Part, RunReport, cost, run};
+use super::run::{RunReport, cost, run};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -13,6 +15,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::start::{begin, folder};
 use crate::cli::values::FileArgument;
+use crate::scene::shard::Shard;
 
 /// Compute the points of a plan, or a part of them
 ///
@@ -37,8 +40,8 @@ pub struct Run {
     #[arg(long, value_name = "DIR")]
     out: FileArgument,
     /// Only part I of N, counted from 1
-    #[arg(long, value_name = "I/N", value_parser = Part::shard)]
-    shard: Option<Part>,
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
+    shard: Option<Shard>,
     /// Only the point with this index, counted from 0
     #[arg(long, value_name = "K", conflicts_with = "shard")]
     index: Option<u64>,
@@ -48,6 +51,20 @@ pub struct Run {
     /// Compute points that are there again, and replace files of another plan
     #[arg(long)]
     force: bool,
+}
+
+/// The point `index` of `points`, from 0.
+///
+/// # Errors
+/// An index beyond the last point.
+fn one_point(index: u64, points: u64) -> Result<Range<u64>, String> {
+    if index < points {
+        return Ok(index..index + 1);
+    }
+    Err(format!(
+        "--index {index} is beyond the plan's last point, {}: they are counted from 0",
+        points - 1
+    ))
 }
 
 #[derive(Serialize)]
@@ -71,12 +88,11 @@ impl Run {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let out = folder(&self.out)?;
         let (plan, _) = documents::plan(&self.plan)?;
-        let part = match (self.shard, self.index) {
-            (Some(shard), _) => shard,
-            (None, Some(index)) => Part::Index(index),
-            (None, None) => Part::Whole,
+        let indices = match (self.shard, self.index) {
+            (Some(shard), _) => shard.of(plan.points),
+            (None, Some(index)) => one_point(index, plan.points).map_err(Failure::Usage)?,
+            (None, None) => 0..plan.points,
         };
-        let indices = part.indices(plan.points).map_err(Failure::Usage)?;
         allow(cost(&plan, &indices)?, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let report = run(&plan, &out, indices.clone(), self.force, &bar)?;
@@ -141,5 +157,16 @@ fn unmet(report: &RunReport) -> Result<(), Failure> {
             Wish::Accuracy
         };
         Err(Failure::Unmet(wish, parts.join("; ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::one_point;
+
+    #[test]
+    fn one_point_of_a_plan_is_counted_from_zero() {
+        assert_eq!(one_point(6, 7), Ok(6..7));
+        assert!(one_point(7, 7).unwrap_err().contains("last point, 6"));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use fluxform_coil::limits::LimitCheck;
+use fluxform_coil::limits::{LimitCheck, by_key};
 
 use super::data::{CalibratedObject, DrivenCoil};
 use super::error_budget::worst;
@@ -138,7 +138,13 @@ fn unmet(limits: &Checks) -> Option<String> {
     }
 }
 
-/// A limit's name in words, and its unit.
+/// The name on screen and page of the limit, or of the number, that artefacts call `key`.
+#[must_use]
+pub fn label(key: &str) -> String {
+    by_key(key).map_or_else(|| words(key).0, |limit| limit.label.to_owned())
+}
+
+/// The name in words of what artefacts call `name`, and its unit.
 #[must_use]
 pub fn words(name: &str) -> (String, &'static str) {
     let units = [
@@ -151,6 +157,7 @@ pub fn words(name: &str) -> (String, &'static str) {
         ("_a", "A"),
         ("_v", "V"),
         ("_n", "N"),
+        ("_h", "H"),
     ];
     let found = units
         .into_iter()

@@ -9,7 +9,7 @@ use super::{MOST_POINTS, Probe, Scattered, too_many};
 use crate::error::ShapeError;
 use crate::height::Sample;
 use crate::point_flags::Marks;
-use fluxform_base::progress::Progress;
+use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::random::Random;
 
 /// Darts into every free cell.
@@ -63,36 +63,7 @@ pub fn poisson(
         count,
         darts: vec![None; count[0] * count[1]],
     };
-    let mut random = Random::new(seed);
-    let mut order: Vec<usize> = (0..cells.darts.len()).collect();
-    for k in (1..order.len()).rev() {
-        order.swap(k, (random.unit() * (k + 1) as f64) as usize);
-    }
-    progress.begin("points", ROUNDS);
-    for _ in 0..ROUNDS {
-        progress.check()?;
-        for &cell in &order {
-            if cells.darts[cell].is_some() {
-                continue;
-            }
-            let place = [cell % count[0], cell / count[0]];
-            let p = [0, 1].map(|k| {
-                let p = probe.plan_m.low_m[k] + (place[k] as f64 + random.unit()) * cell_m;
-                p.min(probe.plan_m.high_m[k])
-            });
-            if cells
-                .nearest(p, 2)
-                .is_some_and(|(_, square)| square < spacing_m * spacing_m)
-            {
-                continue;
-            }
-            if let Some((sample, marks)) = probe.at(p) {
-                cells.darts[cell] = Some((p, sample, marks));
-            }
-        }
-        progress.advance(1);
-    }
-    progress.end();
+    cells.throw(probe, spacing_m, seed, progress)?;
     let mut counted = count_areas(probe, &cells, spacing_m, progress)?;
     if !counted.missed.is_empty() {
         for p in std::mem::take(&mut counted.missed) {
@@ -171,6 +142,50 @@ fn count_areas(
 }
 
 impl Cells {
+    /// Throws darts into the cells until hardly any more fits, none nearer to another than `spacing_m`.
+    ///
+    /// # Errors
+    /// Interruption.
+    fn throw(
+        &mut self,
+        probe: &Probe<'_>,
+        spacing_m: f64,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<(), Interrupted> {
+        let mut random = Random::new(seed);
+        let mut order: Vec<usize> = (0..self.darts.len()).collect();
+        for k in (1..order.len()).rev() {
+            order.swap(k, (random.unit() * (k + 1) as f64) as usize);
+        }
+        progress.begin("points", ROUNDS);
+        for _ in 0..ROUNDS {
+            progress.check()?;
+            for &cell in &order {
+                if self.darts[cell].is_some() {
+                    continue;
+                }
+                let place = [cell % self.count[0], cell / self.count[0]];
+                let p = [0, 1].map(|k| {
+                    let p = probe.plan_m.low_m[k] + (place[k] as f64 + random.unit()) * self.cell_m;
+                    p.min(probe.plan_m.high_m[k])
+                });
+                if self
+                    .nearest(p, 2)
+                    .is_some_and(|(_, square)| square < spacing_m * spacing_m)
+                {
+                    continue;
+                }
+                if let Some((sample, marks)) = probe.at(p) {
+                    self.darts[cell] = Some((p, sample, marks));
+                }
+            }
+            progress.advance(1);
+        }
+        progress.end();
+        Ok(())
+    }
+
     fn place(&self, p: [f64; 2]) -> [usize; 2] {
         [0, 1].map(|k| (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1))
     }

@@ -49,37 +49,28 @@ pub fn read(
 }
 
 /// The bodies of a reply in their places.
-///
-/// Long because what a body states of itself is taken over entry by entry.
 fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, String> {
-    let kernel::Reply {
-        version,
-        unit_mm,
-        chord_mm,
-        loose,
-        moved_roots,
-        bodies,
-        mut parts,
-    } = reply;
+    let unit = |length_mm: f64| length_mm / reply.unit_mm;
+    let (bodies, mut parts) = (reply.bodies, reply.parts);
     if bodies.is_empty() {
         return Err("it holds no solid body; save one, not surfaces or drawings".into());
     }
-    let count = bodies.len();
-    let mut warnings = Vec::new();
-    let mut deviation_mm = 0.0f64;
-    let mut crossing = 0;
+    let mut judged = Judged {
+        read_by: format!("OpenCASCADE (cadquery-ocp {})", reply.version),
+        bodies: bodies.len(),
+        loose: reply.loose,
+        moved_roots: reply.moved_roots,
+        crossing: 0,
+        deviation_mm: 0.0,
+        asked_mm: (options.chord_m).map_or(reply.chord_mm, |chord_m| chord_m * 1e3),
+    };
     for (index, part) in parts.iter_mut().enumerate() {
         let name = bodies.iter().find(|body| body.part == index);
         let verdict = gates::check(part)
             .map_err(|what| format!("body `{}`: {what}", name.map_or("", |body| &body.name)))?;
-        crossing += verdict.crossings;
-        deviation_mm = deviation_mm.max(part.deviation);
+        judged.crossing += verdict.crossings;
+        judged.deviation_mm = judged.deviation_mm.max(part.deviation);
     }
-    let read_by = format!("OpenCASCADE (cadquery-ocp {version})");
-    warnings.push(format!(
-        "{count} bodies were read by {read_by}, facets within {deviation_mm:.4} mm of their faces"
-    ));
-    let unit = |length_mm: f64| length_mm / unit_mm;
     let placed: Vec<Body> = parts
         .into_iter()
         .map(|part| Body {
@@ -106,43 +97,70 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         within: body.within,
         color: body.color,
     });
-    let named: Vec<NamedBody> = named.collect();
-    if loose > 0 {
-        warnings.push(format!(
-            "{loose} faces or shells that bound no body (drawings, dimensions, surfaces) are left out"
-        ));
-    }
-    if moved_roots > 0 {
-        warnings.push(format!(
-            "the file states {moved_roots} placements at its root that move nothing by the standard; \
-             a program that applies them puts the part elsewhere: compare where it lies"
-        ));
-    }
-    if crossing > 0 {
-        warnings.push(format!(
-            "{crossing} pairs of facets of one body pass through each other, though each lies on its \
-             face: the body itself does; the height is that of the upper one"
-        ));
-    }
-    let asked_mm = options.chord_m.map_or(chord_mm, |chord_m| chord_m * 1e3);
-    if deviation_mm > asked_mm {
-        warnings.push(format!(
-            "facets lie up to {deviation_mm:.4} mm from their faces, not {asked_mm:.4} mm: edges of \
-             the file lie beside its faces, or the mesher cannot do better; the larger number counts"
-        ));
-    }
     let coordinates = triangles.as_flattened().as_flattened().iter();
     let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
     Ok(FileMesh {
         coordinate_rounding: 0.5 * gates::WELD * largest.max(longest_side(&triangles)),
         triangles,
-        unit_m: Some(unit_mm / 1e3),
-        deviation: unit(deviation_mm),
+        unit_m: Some(reply.unit_mm / 1e3),
+        deviation: unit(judged.deviation_mm),
         deviation_is_known: true,
-        warnings,
-        bodies: named,
-        read_by: Some(read_by),
+        warnings: judged.warnings(),
+        bodies: named.collect(),
+        read_by: Some(judged.read_by),
     })
+}
+
+/// What a file states of its bodies, and what the gates found of them.
+struct Judged {
+    read_by: String,
+    bodies: usize,
+    loose: usize,
+    moved_roots: usize,
+    crossing: usize,
+    deviation_mm: f64,
+    asked_mm: f64,
+}
+
+impl Judged {
+    fn warnings(&self) -> Vec<String> {
+        let Self {
+            read_by,
+            bodies,
+            loose,
+            moved_roots,
+            crossing,
+            deviation_mm,
+            asked_mm,
+        } = self;
+        let mut warnings = vec![format!(
+            "{bodies} bodies were read by {read_by}, facets within {deviation_mm:.4} mm of their faces"
+        )];
+        if *loose > 0 {
+            warnings.push(format!(
+                "{loose} faces or shells that bound no body (drawings, dimensions, surfaces) are left out"
+            ));
+        }
+        if *moved_roots > 0 {
+            warnings.push(format!(
+                "the file states {moved_roots} placements at its root that move nothing by the standard; \
+                 a program that applies them puts the part elsewhere: compare where it lies"
+            ));
+        }
+        if *crossing > 0 {
+            warnings.push(format!(
+                "{crossing} pairs of facets of one body pass through each other, though each lies on its \
+                 face: the body itself does; the height is that of the upper one"
+            ));
+        }
+        if deviation_mm > asked_mm {
+            warnings.push(format!(
+                "facets lie up to {deviation_mm:.4} mm from their faces, not {asked_mm:.4} mm: edges of \
+                 the file lie beside its faces, or the mesher cannot do better; the larger number counts"
+            ));
+        }
+        warnings
+    }
 }
 
 /// The longest side of the box around the triangles.

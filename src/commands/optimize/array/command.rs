@@ -4,17 +4,20 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 
-use super::physics::{Aim, ArrayPhysics, Constant, Journal};
-use super::{ArrayEnding, ArrayRequest, optimize_array, page, settling_in_array, tables, text};
+use super::physics::{Aim, ArrayPhysics, Constant, Journal, OtherAim};
+use super::{
+    ArrayEnding, ArrayOptimization, ArrayRequest, optimize_array, page, settling_in_array, tables,
+    text,
+};
 use crate::RunError;
-use crate::bundle::artefact::sha256_hex;
-use crate::bundle::atomic::{Overwrite, check_distinct, write};
+use crate::bundle::artefact::{Input, sha256_hex};
+use crate::bundle::atomic::{Overwrite, check_distinct};
 use crate::cli::args::SurfaceFlags;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::start::begin;
+use crate::cli::start::{begin, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::problem::Level;
 use crate::coil::array_search::search::compared;
@@ -24,6 +27,7 @@ use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
 use crate::design::template::Template;
 use crate::design::{Design, Need};
+use crate::lambda::Criterion;
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Progress};
 use crate::scene::cost;
@@ -41,7 +45,7 @@ pub struct ArrayFlags {
     pub vary: Vec<String>,
     /// The force constant that is made large
     #[arg(long, hide_short_help = true, value_name = "NAME", requires = "shapes", default_value = "jnd",
-          value_parser = values::named::<Constant>())]
+          value_parser = values::either::<Criterion, OtherAim, Constant>())]
     pub constant: Constant,
     /// The force constant at which `--constant error` makes the error small, N/m
     #[arg(long = "lambda", hide_short_help = true, value_name = "N/M", requires = "shapes",
@@ -93,10 +97,20 @@ pub struct Shared<'a> {
     pub tolerance: Option<f64>,
 }
 
+/// The files of a search.
+struct Outputs<'a> {
+    /// The first line of what is made of the design.
+    mark: String,
+    /// What design and journal may replace.
+    marked: Overwrite,
+    /// What the table may replace.
+    of_table: Overwrite,
+    plot: Option<Picture<'a>>,
+    report: Option<Picture<'a>>,
+}
+
 impl ArrayFlags {
     /// Runs the search.
-    ///
-    /// Long because every file that will be written is checked before the search, in its order.
     ///
     /// # Errors
     /// See [`Failure`].
@@ -110,22 +124,65 @@ impl ArrayFlags {
         )?;
         let path = shared.design.as_given();
         let text = self.varied(&document.text, path)?;
-        let read = |text: &str| {
-            let read = Design::from_toml(text, path, Need::CALIBRATE);
-            read.map_err(|fault| Failure::Documents(vec![fault]))
-        };
-        let (design, _) = read(&text)?;
+        let read = Design::from_toml(&text, path, Need::CALIBRATE);
+        let (design, _) = read.map_err(|fault| Failure::Documents(vec![fault]))?;
         let (design, text) = settling_in_array(design, text, path, shared.tolerance)?;
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
-        let mark = mark(shared.design, &document.text);
-        let overwrite = Overwrite::beginning(shared.force, &mark, &inputs[..1])
-            .protecting(document.also_read());
-        for file in [shared.out, self.journal.as_ref()].into_iter().flatten() {
-            if let FileArgument::Path(path) = file {
-                overwrite.check(path).map_err(RunError::from)?;
-            }
+        let outputs = self.outputs(shared, &document, &inputs)?;
+        let bar = begin(printer);
+        let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
+        self.read_journal(&physics)?;
+        let request = self.request(shared, shapes.len())?;
+        printer.notice(&estimate(&design, &physics, &request));
+        let source = Document {
+            design: &design,
+            text: &text,
+            path,
+        };
+        let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
+        let journal = physics.journal();
+        let seconds = bar.take_seconds();
+        drop(physics);
+        drop(bar);
+        self.write_journal(&journal, &outputs.mark, &outputs.marked, printer)?;
+        let result = ended?;
+        for warning in &result.warnings {
+            printer.warning(warning);
         }
+        let place = self.write(shared, &outputs, &result, printer)?;
+        let json = printer.with_warnings(&result);
+        printer.summary(place, &json, || {
+            text::summary(&result, shared.out, &seconds)
+        })?;
+        match result.status {
+            ArrayEnding::Done => Ok(()),
+            ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
+            ArrayEnding::Infeasible => Err(Failure::Unmet(
+                Wish::Coil,
+                "no array that was computed meets every limit; the result is the one that breaks them least".to_owned(),
+            )),
+        }
+    }
+
+    /// Every file that will be written, checked before the search.
+    fn outputs<'a>(
+        &'a self,
+        shared: &Shared<'a>,
+        document: &documents::DesignDocument,
+        inputs: &[Input],
+    ) -> Result<Outputs<'a>, Failure> {
+        let mark = mark(shared.design, &document.text);
+        let beginning = |head: &str| {
+            Overwrite::beginning(shared.force, head, &inputs[..1]).protecting(document.also_read())
+        };
+        let check = |overwrite: &Overwrite, file: Option<&FileArgument>| match file {
+            Some(FileArgument::Path(path)) => overwrite.check(path).map_err(RunError::from),
+            Some(FileArgument::Standard) | None => Ok(()),
+        };
+        let marked = beginning(&mark);
+        check(&marked, shared.out)?;
+        check(&marked, self.journal.as_ref())?;
         let files = [
             shared.out,
             self.front.as_ref(),
@@ -147,70 +204,46 @@ impl ArrayFlags {
         let plot = self.plot.as_ref().map(picture);
         let report = shared.report.map(picture);
         for picture in [&plot, &report].into_iter().flatten() {
-            picture.check(&inputs)?;
+            picture.check(inputs)?;
         }
         // The head of the table is its mark.
-        let of_table = Overwrite::beginning(shared.force, tables::HEAD, &inputs[..1])
-            .protecting(document.also_read());
-        if let Some(FileArgument::Path(path)) = &self.front {
-            of_table.check(path).map_err(RunError::from)?;
-        }
-        let bar = begin(printer);
-        let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
-        self.read_journal(&physics)?;
-        let request = self.request(shared, shapes.len())?;
-        printer.notice(&estimate(&design, &physics, &request));
-        let source = Document {
-            design: &design,
-            text: &text,
-            path,
-        };
-        let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
-        let journal = physics.journal();
-        let seconds = bar.take_seconds();
-        drop(physics);
-        drop(bar);
-        self.write_journal(&journal, &mark, &overwrite, printer)?;
-        let result = ended?;
-        for warning in &result.warnings {
-            printer.warning(warning);
-        }
-        let text = format!(
-            "{mark}
-{}",
-            result.design_text
-        );
-        let mut place = written_to(shared.out, &text, &overwrite, printer)?;
-        let front = written_to(
-            self.front.as_ref(),
-            &tables::csv(&result),
-            &of_table,
-            printer,
-        )?;
+        let of_table = beginning(tables::HEAD);
+        check(&of_table, self.front.as_ref())?;
+        Ok(Outputs {
+            mark,
+            marked,
+            of_table,
+            plot,
+            report,
+        })
+    }
+
+    /// Writes every file of the result; returns where the summary goes.
+    fn write(
+        &self,
+        shared: &Shared<'_>,
+        outputs: &Outputs<'_>,
+        result: &ArrayOptimization,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        let design = format!("{}\n{}", outputs.mark, result.design_text);
+        let place = write_to(shared.out, &outputs.marked, printer, |out| {
+            out.write_all(design.as_bytes())
+        })?;
+        let table = tables::csv(result);
+        let front = write_to(self.front.as_ref(), &outputs.of_table, printer, |out| {
+            out.write_all(table.as_bytes())
+        })?;
         let worths = result.study.as_ref().map_or_else(Vec::new, text::worths);
-        let drawn = match (&plot, tables::pareto(&result, &worths)) {
+        let drawn = match (&outputs.plot, tables::pareto(result, &worths)) {
             (Some(plot), Some(pareto)) => plot.draw(&result.inputs, &pareto.drawing(), printer)?,
             _ => Stream::Output,
         };
-        let paged = match &report {
-            Some(report) => report.write(&result.inputs, &page::html(&result), printer)?,
+        let paged = match &outputs.report {
+            Some(report) => report.write(&result.inputs, &page::html(result), printer)?,
             None => Stream::Output,
         };
-        if [front, drawn, paged].contains(&Stream::Error) {
-            place = Stream::Error;
-        }
-        let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || {
-            text::summary(&result, shared.out, &seconds)
-        })?;
-        match result.status {
-            ArrayEnding::Done => Ok(()),
-            ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
-            ArrayEnding::Infeasible => Err(Failure::Unmet(
-                Wish::Coil,
-                "no array that was computed meets every limit; the result is the one that breaks them least".to_owned(),
-            )),
-        }
+        Ok(place.or(front).or(drawn).or(paged))
     }
 
     /// The design's text with what the flags vary.
@@ -239,7 +272,7 @@ impl ArrayFlags {
     }
 
     fn aim(&self) -> Result<Aim, Failure> {
-        if (self.constant == Constant::Error) != self.at_n_per_m.is_some() {
+        if (self.constant == Constant::ERROR) != self.at_n_per_m.is_some() {
             return Err(Failure::Usage(
                 "--constant error and --lambda go together: the error depends on the force constant, \
                  the other constants on none"
@@ -314,7 +347,10 @@ impl ArrayFlags {
         let text = serde_json::to_string_pretty(journal);
         let text = text.map_err(|error| Failure::Input(error.to_string()))?;
         let file = self.journal.as_ref();
-        written_to(file, &format!("{mark}\n{text}\n"), overwrite, printer).map(|_| ())
+        write_to(file, overwrite, printer, |out| {
+            write!(out, "{mark}\n{text}\n")
+        })
+        .map(|_| ())
     }
 }
 
@@ -378,26 +414,6 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
         ends * around,
         (compared as f64 * costliest + (searched + around) as f64 * ends_cpu_s).ceil()
     )
-}
-
-/// Writes a text where that was requested; returns where the summary goes.
-fn written_to(
-    file: Option<&FileArgument>,
-    text: &str,
-    overwrite: &Overwrite,
-    printer: &Printer,
-) -> Result<Stream, Failure> {
-    match file {
-        None => Ok(Stream::Output),
-        Some(FileArgument::Standard) => {
-            printer.data(|out| out.write_all(text.as_bytes()))?;
-            Ok(Stream::Error)
-        }
-        Some(FileArgument::Path(path)) => {
-            write(path, overwrite, |out| out.write_all(text.as_bytes())).map_err(RunError::from)?;
-            Ok(Stream::Output)
-        }
-    }
 }
 
 /// The line by which a design that was made of this one is known from any other file.

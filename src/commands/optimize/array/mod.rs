@@ -237,9 +237,70 @@ fn before(
     })
 }
 
+/// The limits of the best array and of the given one, and whether the best one meets its own.
+struct Checked {
+    limits: BTreeMap<&'static str, LimitCheck>,
+    given: BTreeMap<&'static str, LimitCheck>,
+    met: bool,
+}
+
+/// Checks what `best` and the given design are limited to; `properties` are theirs. What both miss alike, because
+/// nothing that is searched changes it, is a warning.
+fn checked(
+    [best, given]: [&Design; 2],
+    properties: [&Physical; 2],
+    tolerance: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<Checked, RunError> {
+    let evaluation = evaluate(best, Vec::new(), tolerance)?;
+    warnings.extend(evaluation.warnings);
+    let mut limits = evaluation.limits;
+    limits.extend(checks_of_shapes(best, properties[0]));
+    let mut limits_given = evaluate(given, Vec::new(), tolerance)?.limits;
+    limits_given.extend(checks_of_shapes(given, properties[1]));
+    let missed = limits.iter().filter(|(_, check)| !check.met);
+    let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
+        (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
+    });
+    let met = broken.is_empty();
+    let keys: Vec<&str> = unchanged.iter().map(|(key, _)| key.as_ref()).collect();
+    if !keys.is_empty() {
+        warnings.push(format!(
+            "{}: missed by the given design, and nothing that is searched changes it",
+            keys.join(", ")
+        ));
+    }
+    Ok(Checked {
+        limits,
+        given: limits_given,
+        met,
+    })
+}
+
+/// How sure it is that no array is better.
+fn certificate(found: &Found<'_>, bound: Option<PitchBound>, gain: f64) -> ArrayCertificate {
+    let search = &found.search;
+    let objective = |x: &Vec<f64>| {
+        let sample = search.samples().iter().find(|sample| sample.x == *x)?;
+        Some(search.judged(sample)?.objective().exp())
+    };
+    ArrayCertificate {
+        kind: match bound {
+            Some(_) => CertificateKind::Global,
+            None if found.choices.iter().all(|choice| choice.complete) => {
+                CertificateKind::Exhaustive
+            }
+            None => CertificateKind::of_searches(search.ends().len().max(1)),
+        },
+        starts: search.ends().len(),
+        ends: search.ends().iter().filter_map(objective).collect(),
+        upper_bound: bound.map(|bound| bound.gain),
+        gap: bound.map(|bound| bound.gain / gain - 1.0),
+        cells: bound.map_or(0, |bound| bound.pitches),
+    }
+}
+
 /// The result, as it is reported.
-///
-/// Long because it is one literal of the result's fields.
 fn result(
     document: &Document<'_>,
     (shapes, inputs): (&[ShapeSource], Vec<Input>),
@@ -257,8 +318,8 @@ fn result(
     let ratios = ratios(physical, given);
     let gain = together(&ratios, request.shares.as_deref());
     let constant = physics.aim().constant;
-    let of_constant = |merit: f64| (constant != Constant::Error).then_some(merit);
-    let of_error = |merit: f64| (constant == Constant::Error).then(|| merit.recip());
+    let of_constant = |merit: f64| (constant != Constant::ERROR).then_some(merit);
+    let of_error = |merit: f64| (constant == Constant::ERROR).then(|| merit.recip());
     let shape = |(index, source): (usize, &ShapeSource)| {
         let (before, now) = (given.merits[index], physical.merits[index]);
         ShapeGain {
@@ -270,37 +331,20 @@ fn result(
             gain: ratios[index],
         }
     };
-    let search = &found.search;
-    let objective = |x: &Vec<f64>| {
-        let sample = search.samples().iter().find(|sample| sample.x == *x)?;
-        Some(search.judged(sample)?.objective().exp())
-    };
     let (design_text, best) = written(document, found)?;
     let mut warnings = Vec::new();
     // After an interruption nothing more is computed.
-    let (mut limits, mut limits_given) = (BTreeMap::new(), BTreeMap::new());
-    let mut limits_met = bounds.iter().all(|bound| bound.is_met());
-    if !found.interrupted {
-        let evaluation = evaluate(&best, Vec::new(), request.tolerance)?;
-        warnings.extend(evaluation.warnings);
-        limits = evaluation.limits;
-        limits.extend(checks_of_shapes(&best, physical));
-        limits_given = evaluate(document.design, Vec::new(), request.tolerance)?.limits;
-        limits_given.extend(checks_of_shapes(document.design, given));
-        let missed = limits.iter().filter(|(_, check)| !check.met);
-        let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
-            (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
-        });
-        limits_met = broken.is_empty();
-        let keys: Vec<&str> = unchanged.iter().map(|(key, _)| key.as_ref()).collect();
-        if !keys.is_empty() {
-            warnings.push(format!(
-                "{}: missed by the given design, and nothing that is searched changes it",
-                keys.join(", ")
-            ));
+    let checked = if found.interrupted {
+        Checked {
+            limits: BTreeMap::new(),
+            given: BTreeMap::new(),
+            met: bounds.iter().all(|bound| bound.is_met()),
         }
-    }
-    let status = match (found.interrupted, limits_met) {
+    } else {
+        let designs = [&best, document.design];
+        checked(designs, [physical, given], request.tolerance, &mut warnings)?
+    };
+    let status = match (found.interrupted, checked.met) {
         (true, _) => ArrayEnding::Interrupted,
         (false, true) => ArrayEnding::Done,
         (false, false) => ArrayEnding::Infeasible,
@@ -321,24 +365,11 @@ fn result(
         gain,
         shapes: shapes.iter().enumerate().map(shape).collect(),
         values: found.problem.space.named(x),
-        limits,
-        limits_given,
-        limits_met,
+        limits: checked.limits,
+        limits_given: checked.given,
+        limits_met: checked.met,
         study: around,
-        certificate: ArrayCertificate {
-            kind: match bound {
-                Some(_) => CertificateKind::Global,
-                None if found.choices.iter().all(|choice| choice.complete) => {
-                    CertificateKind::Exhaustive
-                }
-                None => CertificateKind::of_searches(search.ends().len().max(1)),
-            },
-            starts: search.ends().len(),
-            ends: search.ends().iter().filter_map(objective).collect(),
-            upper_bound: bound.map(|bound| bound.gain),
-            gap: bound.map(|bound| bound.gain / gain - 1.0),
-            cells: bound.map_or(0, |bound| bound.pitches),
-        },
+        certificate: certificate(found, bound, gain),
         levels: levels(physics, document.design, (before, found))?,
         evaluations: found.evaluations,
         history: history(found),

@@ -30,13 +30,22 @@ use crate::scene::{Scene, neighbours, passive, steel};
 use crate::units::FORCE_JND;
 
 /// The force constant that is made as large as possible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum Constant {
+    /// One of static currents.
+    Static(Criterion),
+    /// Another aim.
+    Other(OtherAim),
+}
+
+/// What else a search makes large, or small.
 #[derive(
     Debug,
     Clone,
     Copy,
     PartialEq,
     Eq,
-    Default,
     EnumMessage,
     EnumString,
     IntoStaticStr,
@@ -45,16 +54,7 @@ use crate::units::FORCE_JND;
 )]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
-pub enum Constant {
-    /// Where the first limit binds
-    Linear,
-    /// The largest at which limits add less than a just-noticeable difference
-    #[default]
-    Jnd,
-    /// Beyond it no current changes
-    Saturation,
-    /// The largest with no point too weak
-    Maxmin,
+pub enum OtherAim {
     /// The largest with currents of their own at every point
     Feedback,
     /// The same for the force vector, nothing sideways
@@ -64,15 +64,33 @@ pub enum Constant {
 }
 
 impl Constant {
+    /// The least error at a given force constant, no force constant itself.
+    pub const ERROR: Self = Self::Other(OtherAim::Error);
+
     /// The static constant, where it is one.
     fn criterion(self) -> Option<Criterion> {
         match self {
-            Self::Linear => Some(Criterion::Linear),
-            Self::Jnd => Some(Criterion::Jnd),
-            Self::Saturation => Some(Criterion::Saturation),
-            Self::Maxmin => Some(Criterion::Maxmin),
-            Self::Feedback | Self::Vector | Self::Error => None,
+            Self::Static(criterion) => Some(criterion),
+            Self::Other(_) => None,
         }
+    }
+}
+
+impl Default for Constant {
+    fn default() -> Self {
+        Self::Static(Criterion::default())
+    }
+}
+
+impl From<Criterion> for Constant {
+    fn from(criterion: Criterion) -> Self {
+        Self::Static(criterion)
+    }
+}
+
+impl From<OtherAim> for Constant {
+    fn from(aim: OtherAim) -> Self {
+        Self::Other(aim)
     }
 }
 
@@ -268,13 +286,10 @@ impl<'a> ArrayPhysics<'a> {
         let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
         let coils = scene.coils.len();
         let sides = match self.aim.constant {
-            Constant::Vector => Some(scene.force_vectors_n_per_a(&solved, &positions, &Silent)?),
-            Constant::Linear
-            | Constant::Jnd
-            | Constant::Saturation
-            | Constant::Maxmin
-            | Constant::Feedback
-            | Constant::Error => None,
+            Constant::Other(OtherAim::Vector) => {
+                Some(scene.force_vectors_n_per_a(&solved, &positions, &Silent)?)
+            }
+            Constant::Other(OtherAim::Feedback | OtherAim::Error) | Constant::Static(_) => None,
         };
         let forces = match &sides {
             Some(vectors) => vectors.iter().map(|force| force[2]).collect(),
@@ -335,7 +350,7 @@ impl<'a> ArrayPhysics<'a> {
     /// The force constant, or the inverse of the error; `None` where nothing is rendered.
     fn merit(&self, shape: &Rendering<'_>) -> Result<Option<f64>, RunError> {
         let problem = &shape.problem;
-        if let (Constant::Error, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
+        if let (Constant::ERROR, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
             let error = relative_error(problem, lambda_n_per_m)?;
             return Ok(error.map(|error| error.max(LEAST_ERROR).recip()));
         }

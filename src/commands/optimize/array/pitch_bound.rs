@@ -15,8 +15,8 @@ use crate::coil::array_search::problem::{ArrayProblem, Level};
 use crate::coil::array_search::space::Axis;
 use crate::coil::limits::LimitName;
 use crate::design::MagnetModel;
-use crate::lambda::ForceProblem;
 use crate::lambda::enclosure::{Between, JndCurrents, jnd_currents};
+use crate::lambda::{Criterion, ForceProblem};
 use crate::progress::{Progress, Silent};
 use crate::scene::{Scene, steel};
 
@@ -89,7 +89,7 @@ pub fn pitch_bound(
     let applies = design.core.is_none()
         && !design.has_iron()
         && design.magnet.model == MagnetModel::Dipole
-        && physics.aim().constant == Constant::Jnd;
+        && physics.aim().constant == Constant::Static(Criterion::Jnd);
     if !applies {
         return Ok(None);
     }

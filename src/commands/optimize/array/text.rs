@@ -1,6 +1,6 @@
 //! The summary of `optimize --for`.
 
-use super::physics::Constant;
+use super::physics::{Constant, OtherAim};
 use super::{ArrayEnding, ArrayOptimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::layout::{Sheet, Side, table};
@@ -107,7 +107,7 @@ pub fn one_more(limit: &LimitWorth) -> String {
         None if limit.key.ends_with("_m") => ("mm", 1e3),
         None => ("mm", 1.0),
     };
-    let label = crate::cli::limits::label(limit.key);
+    let label = crate::report::limits::label(limit.key);
     let given = percent(limit.gain_per_unit.abs() / per_si);
     let way = if limit.gain_per_unit < 0.0 {
         "less"
@@ -119,13 +119,8 @@ pub fn one_more(limit: &LimitWorth) -> String {
 
 fn shapes(result: &ArrayOptimization) -> String {
     let what = match result.constant {
-        Constant::Error => "error",
-        Constant::Linear
-        | Constant::Jnd
-        | Constant::Saturation
-        | Constant::Maxmin
-        | Constant::Feedback
-        | Constant::Vector => "lambda",
+        Constant::ERROR => "error",
+        Constant::Static(_) | Constant::Other(OtherAim::Feedback | OtherAim::Vector) => "lambda",
     };
     let head = ["shape", "before", what, "gain"]
         .map(str::to_owned)
