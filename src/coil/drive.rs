@@ -7,7 +7,8 @@
 //! held voltages, so a step may be longer than any time constant, and two steps give what one of
 //! their length does. Eddy currents are left out; `coil::transient` estimates them.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use fluxform_numerics::bounded_eigen::symmetric_eigen;
+use nalgebra::DMatrix;
 
 /// The inductance matrix may be unsymmetric by this share of its largest entry: its error.
 const SYMMETRIC: f64 = 1e-2;
@@ -92,7 +93,7 @@ impl Drive {
         let (time_constant_s, modes) = if coils == 0 {
             (Vec::new(), Vec::new())
         } else {
-            let eigen = SymmetricEigen::new(matrix);
+            let eigen = symmetric_eigen(matrix).ok_or(DriveError::Inductance)?;
             (
                 eigen.eigenvalues.as_slice().to_vec(),
                 eigen.eigenvectors.as_slice().to_vec(),
@@ -348,7 +349,8 @@ mod tests {
             Drive::new(&[0.1], &[0.0], None).unwrap_err(),
             DriveError::Resistance { coil: 0 }
         );
-        for bad in [[0.1, 0.3, 0.3, 0.1], [0.1, 0.05, 0.0, 0.1], [0.0; 4]] {
+        let none = [f64::NAN, 0.01, 0.01, 0.1];
+        for bad in [[0.1, 0.3, 0.3, 0.1], [0.1, 0.05, 0.0, 0.1], [0.0; 4], none] {
             let refused = Drive::new(&bad, &[1.0, 1.3], None).unwrap_err();
             assert_eq!(refused, DriveError::Inductance);
         }

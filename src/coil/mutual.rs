@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::ring::{RingPoint, ring_field};
 use fluxform_field::winding::Winding;
+use fluxform_numerics::bounded_eigen::largest_eigenvalue;
 use fluxform_numerics::gauss;
 use nalgebra::DMatrix;
 
@@ -167,12 +168,13 @@ pub fn estimated_matrix_h(
 }
 
 /// The inductance of the slowest pattern of currents, H: the largest eigenvalue of an inductance
-/// matrix. Over R it is the longest time constant of equal coils, which that of none alone is.
+/// matrix. Over R it is the longest time constant of equal coils, which that of none alone is. NaN where the
+/// matrix holds such a number, or none.
 #[must_use]
 pub fn slowest_inductance_h(matrix_h: &[Vec<f64>]) -> f64 {
     let entry = |i: usize, j: usize| 0.5 * (matrix_h[i][j] + matrix_h[j][i]);
     let matrix = DMatrix::from_fn(matrix_h.len(), matrix_h.len(), entry);
-    matrix.symmetric_eigenvalues().max()
+    largest_eigenvalue(matrix).unwrap_or(f64::NAN)
 }
 
 /// The largest inductance of a coil among the others, H: the largest entry of the diagonal.
@@ -224,6 +226,8 @@ mod tests {
         let triangle = [[2.0, 0.3, 0.3], [0.3, 2.0, 0.3], [0.3, 0.3, 2.0]].map(Vec::from);
         assert!((slowest_inductance_h(&triangle) - 2.6).abs() < 1e-12);
         assert!((slowest_inductance_h(&[vec![1.7]]) - 1.7).abs() < 1e-15);
+        assert!(slowest_inductance_h(&[vec![1.7, f64::NAN], vec![0.3, 1.3]]).is_nan());
+        assert!(slowest_inductance_h(&[]).is_nan());
     }
 
     #[test]

@@ -5,8 +5,9 @@
 //! is diagonal (Lynch, Rice and Thomas, Numer. Math. 6, 185, 1964), and what the faces give
 //! needs two-dimensional transforms only.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
+use super::bounded_eigen::symmetric_eigen;
 use super::matrix::{product, transpose};
 use super::spectral::Spectral;
 
@@ -41,7 +42,7 @@ impl Modes {
         let scaled = DMatrix::from_fn(inner, inner, |i, j| {
             stiffness[(i + 1) * n + j + 1] / (root[i] * root[j])
         });
-        let eigen = SymmetricEigen::new(scaled);
+        let eigen = symmetric_eigen(scaled).expect("an axis of finite nodes has modes");
         let at = |i: usize, a: usize| eigen.eigenvectors[(i, a)];
         let fill = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
             (0..inner * inner)

@@ -4,6 +4,7 @@ pub mod anderson;
 pub mod axis;
 pub mod bessel;
 pub mod block_toeplitz;
+pub mod bounded_eigen;
 pub mod bounded_svd;
 pub mod box_tree;
 pub mod chebyshev;

@@ -2,8 +2,9 @@
 
 use super::CoreShape;
 use super::array::{ArrayResolution, grids_at_once, representatives};
+use super::array_request::{FINER, FIRST_AIM};
 use super::offsets::Offsets;
-use super::reduced_coupling::is_lattice;
+use super::reduced_coupling::{BLOCK, is_lattice};
 use super::symmetry::motions;
 
 /// Cores of which offsets and symmetries are counted; of more, bounds are used.
@@ -18,18 +19,25 @@ const NUMBER_BYTES: f64 = 8.0;
 const SENT: f64 = 0.022;
 /// Matrices of the pull's coupling that are there at once.
 const PULL_MATRICES: f64 = 5.0;
-/// Coefficients that pass between many cores, as a share of a core's unknowns: 0.3 to 0.45 for cores 4 to 5
-/// radii apart.
-const PASSED: f64 = 0.4;
+/// The tolerance from which on resolutions are refined, once for every power of ten: two refinements at 1e-2,
+/// one at 1e-3, none at 1e-4 for 36 to 900 cores 4 radii apart.
+const REFINED_FROM: f64 = 1e-4;
+/// Coefficients that pass between many cores, as a share of a core's unknowns, for every power of ten of the
+/// resolution's aim: 0.35 at 1.8e-3, 0.41 at 6e-4, 0.47 at 2e-4 for cores 4 radii apart.
+const PASSED: f64 = 0.127;
 /// Steps of a lattice's periodic plane for every core, and matrices of each that are there at once.
 const LATTICE_STEPS: f64 = 4.0;
 const LATTICE_MATRICES: f64 = 2.0;
-/// Drives whose vectors are there at once, about, and those that are solved at the coarse resolution too.
-const TOGETHER: f64 = 32.0;
+/// What passes between cores of one offset, most of which are far, of what passes between the closest.
+const FAR: f64 = 0.6;
+/// Matrices of a core's grid that are there at once as what passes is chosen.
+const GRID_MATRICES: f64 = 12.0;
+/// Drives that are solved at the coarse resolution too.
 const COMPARED: f64 = 8.0;
-/// By how much products for many cores, of many columns at a time, are quicker than those of pairs of cores:
-/// 225 cores took 8.8 and 26 CPU s, 900 took 62 and 198.
-const QUICKER: f64 = 3.0;
+/// By how much products for many cores, of many columns at a time, are quicker than those of pairs of cores.
+const QUICKER: f64 = 6.0;
+/// Operations of choosing what passes, in cubes of a core's unknowns.
+const CHOSEN_CUBES: f64 = 4.0;
 /// Operations of factoring and solving for all columns, in cubes of the size.
 const PULL_CUBES: f64 = 8.0 / 3.0;
 /// Bytes of a pair of cores in the table of offsets.
@@ -66,7 +74,9 @@ impl ArrayCost {
         } else {
             (0, cores.div_ceil(8))
         };
-        let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m).within_memory(
+        let refinements = (tolerance / REFINED_FROM).log10().max(0.0);
+        let aim = FIRST_AIM * tolerance * FINER.powf(refinements);
+        let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(
             shape,
             winding_length_m,
             offsets,
@@ -75,21 +85,25 @@ impl ArrayCost {
         let (cores, offsets, drives) = (cores as f64, offsets as f64, drives as f64);
         let least_error = 2.0 * resolution.exchange_error(shape, closest_m);
         if offsets == 0.0 && cores > 1.0 {
-            let block = (PASSED * size).powi(2);
+            let passed = (-PASSED * aim.log10()).clamp(0.1, 1.0) * size;
+            let block = passed * passed;
             // Offsets of a lattice, of which every eighth is computed, or half of all pairs.
-            let (products, different) = if is_lattice(positions_m) {
-                (LATTICE_STEPS * cores, 0.5 * cores)
+            let (products, different, matrices) = if is_lattice(positions_m) {
+                let steps = LATTICE_STEPS * cores;
+                (steps, 0.5 * cores, LATTICE_MATRICES * steps)
             } else {
-                (cores * cores, 0.5 * cores * cores)
+                (cores * cores, 0.5 * cores * cores, 0.0)
             };
-            let vectors = (STEPS + 4.0) * drives.min(TOGETHER) * cores * PASSED * size;
-            let passed = different * block + LATTICE_MATRICES * LATTICE_STEPS * cores * block;
-            let solved = SOLUTIONS * cores * drives * PASSED * size;
+            let vectors = (STEPS + 4.0) * drives.min(BLOCK as f64) * cores * passed;
+            let solved = cores * drives * passed;
+            let grids = GRID_MATRICES * size * size;
             return Self {
-                bytes: NUMBER_BYTES * (passed + vectors + solved),
+                bytes: NUMBER_BYTES
+                    * ((FAR * different + matrices) * block + vectors + solved + grids),
                 operations: STEPS * 4.0 * products * block * (drives + drives.min(COMPARED))
                     / QUICKER
-                    + SOLUTIONS * different * size * (10.0 * size + 2.0 * PASSED * size),
+                    + SOLUTIONS * different * size * (10.0 * size + 2.0 * passed)
+                    + CHOSEN_CUBES * size.powi(3),
                 least_error,
             };
         }

@@ -25,7 +25,9 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MOST_REFINEMENTS: usize = 4;
 /// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
-const FIRST_AIM: f64 = 2.0;
+pub(super) const FIRST_AIM: f64 = 2.0;
+/// What a refinement makes of the aim.
+pub(super) const FINER: f64 = 0.3;
 /// Distance above the cores, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 /// Heights above the cores, in radii, below which the outline is resolved for places close to it.
@@ -323,7 +325,7 @@ impl<'a> ArrayRequest<'a> {
     /// The coarse and the fine resolution after some refinements.
     fn resolutions(&self, refinement: usize) -> [ArrayResolution; 2] {
         let (shape, positions_m) = (self.shape, self.positions_m);
-        let aim = (0..refinement).fold(FIRST_AIM * self.tolerance, |aim, _| 0.3 * aim);
+        let aim = (0..refinement).fold(FIRST_AIM * self.tolerance, |aim, _| FINER * aim);
         let mut fine = ArrayResolution::for_tolerance(aim, shape, closest_m(positions_m));
         let near = self.lowest_m() < shape.top_m.max(0.0) + NEAR * shape.radius_m;
         if near && fine.modes > 1 {
@@ -332,7 +334,7 @@ impl<'a> ArrayRequest<'a> {
         }
         let offsets = grids_at_once(positions_m);
         let mut fine = fine.within_memory(shape, self.winding.length_m, offsets);
-        let mut coarse = fine.coarser();
+        let mut coarse = fine.reference(shape, closest_m(positions_m));
         if near {
             fine.outline = Resolution::near_steel(0.3 * aim);
             coarse.outline = fine.outline.coarser_near_steel();
@@ -376,7 +378,11 @@ impl<'a> ArrayRequest<'a> {
                 }
                 best = Some(fine);
             }
-            if reached || !better || exchange > self.tolerance {
+            // At the caps a finer resolution is no better at what the closest cores exchange.
+            let [_, finer] = self.resolutions(refinement + 1);
+            let capped =
+                finer.exchange_error(self.shape, closest_m(self.positions_m)) >= 0.5 * exchange;
+            if reached || !better || (exchange > self.tolerance && capped) {
                 break;
             }
         }

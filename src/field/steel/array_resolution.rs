@@ -10,6 +10,8 @@ pub(super) const MOST_MODES: usize = 17;
 /// about half their radius ask for more, and the stated error grows.
 const MOST_UNKNOWNS: usize = 3500;
 const MOST_ENTRIES: usize = 300_000_000;
+/// By how much more is left out of what passes between cores at the resolution that one is compared with.
+const LEFT_OUT_MORE: f64 = 3.0;
 /// Share of the tolerance given to the linear solver.
 pub(super) const SOLVER_SHARE: f64 = 0.01;
 
@@ -109,6 +111,21 @@ impl ArrayResolution {
     #[must_use]
     pub fn angles(&self) -> usize {
         (2 * self.modes).next_multiple_of(4)
+    }
+
+    /// The resolution that shows the error of this one: the next coarser, with as many modes fewer as halve
+    /// what they come to, and more left out of what passes.
+    ///
+    /// Close to a core the modes m that another sends it are seen as they arrive, and decay like
+    /// ((d - R)/R)^-m: of cores that nearly touch one mode more or less shows little of all that are missing.
+    pub(super) fn reference(&self, shape: CoreShape, closest_m: f64) -> Self {
+        let decay = ((closest_m - shape.radius_m) / shape.radius_m).ln();
+        let fewer = (std::f64::consts::LN_2 / decay).ceil().max(1.0) as usize;
+        Self {
+            modes: self.modes.saturating_sub(fewer).max(1),
+            residual: LEFT_OUT_MORE * self.residual,
+            ..self.coarser()
+        }
     }
 
     /// The next coarser resolution.

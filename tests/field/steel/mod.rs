@@ -6,9 +6,11 @@
 mod array;
 mod claims;
 mod convergence;
+mod crowded;
 mod demagnetization;
 mod extremes;
 mod field;
+mod memory;
 mod near;
 mod oracle;
 mod saturation;

@@ -26,6 +26,7 @@ use crate::steel::offsets::Offsets;
 use crate::steel::response::{Response, Rings};
 use crate::steel::symmetry::Motion;
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::bounded_eigen::symmetric_eigen;
 use fluxform_numerics::vec3::{dot, minus};
 
 /// Longest panel of the exchange grid, in distances from the magnet.
@@ -333,7 +334,8 @@ impl Basis {
         for ((mode, layers), (gram, cross)) in response.layers.iter().enumerate().zip(products) {
             let (waves, norm) = (waves_of(mode), norm_of(mode, angles));
             let moments = response.exchange.moments(layers);
-            let eigen = gram.symmetric_eigen();
+            let eigen =
+                symmetric_eigen(gram).expect("the products of finite potentials have eigenvectors");
             for (place, square) in eigen.eigenvalues.iter().enumerate() {
                 let x: DVector<f64> = eigen.eigenvectors.column(place).into();
                 let slope: DVector<f64> = &cross * &x / *square;
