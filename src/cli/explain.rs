@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::code::Code;
 use super::failure::Failure;
-use super::layout::{Side, table};
+use super::layout::table;
 use super::printer::{Printer, Stream};
 
 /// The codes to be explained.
@@ -84,7 +84,7 @@ fn list(codes: &[Code]) -> String {
         vec![code.name().to_owned(), exit, code.meaning().to_owned()]
     };
     let rows: Vec<_> = std::iter::once(head).chain(codes.iter().map(row)).collect();
-    table(&[Side::Left, Side::Right, Side::Left], &rows)
+    table("lrl", &rows)
 }
 
 fn pages(codes: &[Code]) -> String {

@@ -17,7 +17,7 @@ pub struct Sheet {
 
 /// Which side the cells of a column keep to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+enum Side {
     /// Words.
     Left,
     /// Numbers.
@@ -69,10 +69,19 @@ const WRAPPED_MIN: usize = 20;
 
 /// Rows with aligned columns, two blanks between them, indented by two. The decimal points of a column
 /// of numbers are in line. What is wider than the terminal is wrapped in its last column where that
-/// holds words, and else continued below, with the first column again.
+/// holds words, and else continued below, with the first column again. `sides` has a letter per column, `l` for
+/// text that keeps to the left, `r` for numbers.
 #[must_use]
-pub fn table(sides: &[Side], rows: &[Vec<String>]) -> String {
-    table_within(sides, rows, columns().unwrap_or(usize::MAX))
+pub fn table(sides: &str, rows: &[Vec<String>]) -> String {
+    table_within(&of_letters(sides), rows, columns().unwrap_or(usize::MAX))
+}
+
+fn of_letters(sides: &str) -> Vec<Side> {
+    let side = |letter| match letter {
+        'l' => Side::Left,
+        _ => Side::Right,
+    };
+    sides.chars().map(side).collect()
 }
 
 fn table_within(sides: &[Side], rows: &[Vec<String>], columns: usize) -> String {
@@ -185,9 +194,8 @@ pub fn headed_table<'a>(rows: impl IntoIterator<Item = Vec<(&'a str, String)>>) 
         }
         lines.push(row.into_iter().map(|(_, cell)| cell).collect());
     }
-    let mut sides = vec![Side::Right; lines.first().map_or(0, Vec::len)];
-    sides.iter_mut().take(1).for_each(|side| *side = Side::Left);
-    table(&sides, &lines)
+    let numbers = lines.first().map_or(0, Vec::len).saturating_sub(1);
+    table(&format!("l{}", "r".repeat(numbers)), &lines)
 }
 
 /// `values` as a grid of `columns`, numbers right-aligned, without indentation.
@@ -213,7 +221,7 @@ mod tests {
             vec!["name".to_owned(), "value".to_owned(), String::new()],
             vec!["length".to_owned(), "13 mm".to_owned(), "met".to_owned()],
         ];
-        let text = table(&[Side::Left, Side::Right, Side::Left], &rows);
+        let text = table("lrl", &rows);
         assert_eq!(text, "  name    value\n  length  13 mm  met\n");
     }
 
@@ -222,7 +230,7 @@ mod tests {
         let cells = ["length", "13.25 mm", "2 mm", "-101.5 mm", "none"];
         let rows: Vec<Vec<String>> = cells.map(|cell| vec![cell.to_owned()]).to_vec();
         let expected = "      length\n    13.25 mm\n     2 mm\n  -101.5 mm\n        none\n";
-        assert_eq!(table(&[Side::Right], &rows), expected);
+        assert_eq!(table("r", &rows), expected);
     }
 
     #[test]
@@ -236,13 +244,13 @@ mod tests {
                 "the length of the winding along its axis",
             ]),
         ];
-        let words = table_within(&[Side::Left, Side::Right, Side::Left], &rows, 46);
+        let words = table_within(&of_letters("lrl"), &rows, 46);
         let below = " ".repeat(22);
         let expected = format!(
             "  key        default  meaning\n  length_mm       13  the length of the\n{below}winding along its axis\n"
         );
         assert_eq!(words, expected);
-        let numbers = table_within(&[Side::Left, Side::Right, Side::Right], &rows, 40);
+        let numbers = table_within(&of_letters("lrr"), &rows, 40);
         assert!(numbers.lines().all(|line| line.len() <= 56), "{numbers}");
         assert_eq!(numbers.matches("length_mm").count(), 2, "{numbers}");
     }

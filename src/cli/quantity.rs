@@ -1,47 +1,15 @@
 //! Numbers for people: nice units, few digits.
 
 use crate::digits::with_error;
+use crate::report::number::{plain, prefix_of};
 
 /// Significant digits on screen.
 const DIGITS: i32 = 5;
 
-const PREFIXES: [(i32, &str); 8] = [
-    (-12, "p"),
-    (-9, "n"),
-    (-6, "u"),
-    (-3, "m"),
-    (0, ""),
-    (3, "k"),
-    (6, "M"),
-    (9, "G"),
-];
-
 /// `value` rounded to `digits` significant digits, without trailing zeros.
 #[must_use]
 pub fn number_to(value: f64, digits: i32) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // Through the decimal digits: they show the exponent after rounding.
-    let rounded = format!("{:.*e}", (digits - 1).max(0) as usize, value);
-    let exponent: i32 = rounded
-        .split_once('e')
-        .and_then(|(_, exponent)| exponent.parse().ok())
-        .unwrap_or(0);
-    if !(-4..digits.max(6)).contains(&exponent) {
-        let (mantissa, _) = rounded.split_once('e').unwrap_or((&rounded, ""));
-        return format!("{}e{exponent}", trimmed(mantissa));
-    }
-    let decimals = (digits - 1 - exponent).max(0) as usize;
-    trimmed(&format!("{value:.decimals$}")).to_owned()
-}
-
-fn trimmed(text: &str) -> &str {
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        text
-    }
+    plain(value, digits.max(1) as usize)
 }
 
 /// `x 0 to 20, y -5 to 5, z 0 to 3`: a box's ends. What rounding left of a zero, a billionth of the
@@ -80,15 +48,6 @@ pub fn si_with_error(value: f64, relative: f64, unit: &str) -> String {
         "{} {prefix}{unit}",
         with_error(scaled, relative * scaled.abs())
     )
-}
-
-/// The prefix for a number of this power of ten, and its own.
-fn prefix_of(exponent: i32) -> (i32, &'static str) {
-    PREFIXES
-        .into_iter()
-        .rev()
-        .find(|(power, _)| *power <= exponent)
-        .unwrap_or(PREFIXES[0])
 }
 
 fn si_to(value: f64, unit: &str, digits: i32) -> String {

@@ -12,7 +12,7 @@ pub use super::bar::{Bar, Watch};
 pub use super::exit::Exit;
 pub use super::failure::Failure;
 pub use super::help::{Codes, page};
-pub use super::layout::{Sheet, Side, table};
+pub use super::layout::{Sheet, table};
 pub use super::printer::{Captured, Printer, Stream};
 pub use super::quantity::{bytes, count, error, number_to, si};
 pub use super::start::{begin, folder};

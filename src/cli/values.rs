@@ -130,13 +130,22 @@ fn number(text: &str) -> Result<f64, String> {
 }
 
 fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
+    several(text, expected, number)
+}
+
+/// `N` values between commas, each as `one` reads it.
+fn several<const N: usize>(
+    text: &str,
+    expected: &str,
+    one: fn(&str) -> Result<f64, String>,
+) -> Result<[f64; N], String> {
     let parts: Vec<&str> = text.split(',').collect();
     if parts.len() != N {
         return Err(format!("expected {expected}, found {} values", parts.len()));
     }
     let mut values = [0.0; N];
     for (value, part) in values.iter_mut().zip(parts) {
-        *value = number(part).map_err(|fault| format!("expected {expected}: {fault}"))?;
+        *value = one(part).map_err(|fault| format!("expected {expected}: {fault}"))?;
     }
     Ok(values)
 }
@@ -164,15 +173,7 @@ fn metres(text: &str) -> Result<f64, String> {
 
 /// `N` lengths, m.
 fn lengths<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
-    let parts: Vec<&str> = text.split(',').collect();
-    if parts.len() != N {
-        return Err(format!("expected {expected}, found {} values", parts.len()));
-    }
-    let mut values = [0.0; N];
-    for (value, part) in values.iter_mut().zip(parts) {
-        *value = metres(part).map_err(|fault| format!("expected {expected}: {fault}"))?;
-    }
-    Ok(values)
+    several(text, expected, metres)
 }
 
 /// `X,Y,Z`, in millimetres or with units.

@@ -43,7 +43,7 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
 }
 
 /// Those of `discretize`.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(crate) struct PointsAsked {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<Weights>,

@@ -7,8 +7,8 @@ use clap::builder::PossibleValuesParser;
 use fluxform::RunError;
 use fluxform::bundle::json::to_json;
 use fluxform::cli::shell::{
-    Codes, Common, Failure, FileArgument, Printer, Program, Sheet, Side, Stream, Writing, begin,
-    folder, page, table,
+    Codes, Common, Failure, FileArgument, Printer, Program, Sheet, Stream, Writing, begin, folder,
+    page, table,
 };
 use fluxform::cli::shell::{bytes, count, error, number_to, si};
 use fluxform::progress::Progress;
@@ -231,14 +231,8 @@ fn cases_text(rows: &[CaseRow]) -> String {
             number_to(row.seconds, 2),
         ]
     }));
-    let sides = [
-        Side::Left,
-        Side::Left,
-        Side::Right,
-        Side::Right,
-        Side::Right,
-    ];
-    sheet.raw(&table(&sides, &lines));
+    let sides = "llrrr";
+    sheet.raw(&table(sides, &lines));
     for row in rows.iter().filter(|row| !row.pass) {
         sheet.gap();
         sheet.line("failed", &row.name);
@@ -271,9 +265,8 @@ fn summary(file: &BenchFile, folder: &str) -> String {
             rows.push(cells);
         }
     }
-    let mut sides = [Side::Right; 9];
-    sides[..3].fill(Side::Left);
-    sheet.raw(&table(&sides, &rows));
+    let sides = "lllrrrrrr";
+    sheet.raw(&table(sides, &rows));
     sheet.gap();
     let files: Vec<String> = file
         .files

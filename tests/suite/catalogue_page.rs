@@ -1,7 +1,7 @@
 //! The page of the stability catalogue: how many cases came out as expected, and every case.
 
 use fluxform::bundle::artefact::FLUXFORM_VERSION;
-use fluxform::report::frame::{Page, Section};
+use fluxform::report::frame::{Page, Section, foot};
 use fluxform::report::html::{Cell, Html, Table};
 use fluxform::report::number::{count, figures, si};
 use serde_json::{Map, Value};
@@ -49,7 +49,7 @@ pub fn html(cases: &[CaseRow]) -> String {
             body,
         }],
         data: Value::Object(Map::new()),
-        foot: format!("fluxform {FLUXFORM_VERSION}. This page needs nothing but itself."),
+        foot: foot(FLUXFORM_VERSION, ""),
     }
     .html()
 }

@@ -1,6 +1,6 @@
 //! The page of a run: how the defaults stand, then the curves they stand on.
 
-use fluxform::report::frame::{Page, Section, figure};
+use fluxform::report::frame::{Page, Section, figure, foot};
 use fluxform::report::html::{Cell, Html, Table};
 use fluxform::report::inputs::sources;
 use fluxform::report::measured::{MeasuredCurve, MeasuredRow};
@@ -52,11 +52,7 @@ pub fn html(file: &BenchFile) -> String {
     if !file.scaling.is_empty() {
         sections.push(laws(&file.scaling));
     }
-    let inputs = file.inputs.iter();
-    let inputs: Vec<(&str, &str)> = inputs
-        .map(|i| (i.path.as_str(), i.sha256.as_str()))
-        .collect();
-    sections.push(sources(&inputs));
+    sections.push(sources(&file.inputs));
     let mut lead = Html::default();
     lead.element("p class=\"lead\"", &reported(&standings));
     Page {
@@ -65,10 +61,10 @@ pub fn html(file: &BenchFile) -> String {
         lead,
         sections,
         data: Value::Object(data),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself; its numbers are those of bench.csv and \
-             bench.json beside it. Seconds differ from run to run, errors do not.",
-            file.fluxform_version
+        foot: foot(
+            &file.fluxform_version,
+            "; its numbers are those of bench.csv and \
+             bench.json beside it. Seconds differ from run to run, errors do not",
         ),
     }
     .html()

@@ -484,13 +484,6 @@ fn ln_peaks_of(coils: &[CoredCoil], accuracy: f64) -> Option<Vec<f64>> {
     peaks_t.into_iter().map(ln).collect()
 }
 
-fn product(a: Sloped, b: Sloped) -> Sloped {
-    Sloped {
-        value: a.value * b.value,
-        slope: std::array::from_fn(|i| a.slope[i] * b.value + a.value * b.slope[i]),
-    }
-}
-
 impl CoilModel for CoredModel {
     fn response(
         &self,
@@ -510,10 +503,10 @@ impl CoilModel for CoredModel {
             .ok_or_else(unsolved)?;
         let mut factor = self.chained(window, &ratio);
         factor.value += 1.0;
-        response.force_n = product(response.force_n, factor);
+        response.force_n = response.force_n.product(factor);
         if let Some([force, _]) = &self.factors.neighbours {
             let by = self.chained(window, &force.interpolated(at));
-            response.force_n = product(response.force_n, by);
+            response.force_n = response.force_n.product(by);
         }
         let radius_m = window.inner_radius_m - self.rule.clearance_m;
         let area_m2 = window.depth_m * window.length_m;
@@ -527,15 +520,18 @@ impl CoilModel for CoredModel {
                 value: radius_m,
                 slope: [1.0, 0.0, 0.0, 0.0],
             };
-            let per_turns = product(self.chained(window, &added), radius).times(MU_0_T_M_PER_A);
-            let steel = product(per_turns, product(turns, turns));
+            let per_turns = self
+                .chained(window, &added)
+                .product(radius)
+                .times(MU_0_T_M_PER_A);
+            let steel = per_turns.product(turns.product(turns));
             response.inductance_h.value += steel.value;
             for (sum, slope) in response.inductance_h.slope.iter_mut().zip(steel.slope) {
                 *sum += slope;
             }
             if let Some([_, inductance]) = &self.factors.neighbours {
                 let by = self.chained(window, &inductance.interpolated(at));
-                response.inductance_h = product(response.inductance_h, by);
+                response.inductance_h = response.inductance_h.product(by);
             }
         }
         let section = PI * STEEL_DENSITY_KG_PER_M3 * radius_m;

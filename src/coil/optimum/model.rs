@@ -68,6 +68,25 @@ impl Sloped {
         }
     }
 
+    /// Times another.
+    #[must_use]
+    pub(crate) fn product(self, by: Self) -> Self {
+        Self {
+            value: self.value * by.value,
+            slope: std::array::from_fn(|i| self.slope[i] * by.value + self.value * by.slope[i]),
+        }
+    }
+
+    /// Over another.
+    #[must_use]
+    pub(crate) fn ratio(self, over: Self) -> Self {
+        let value = self.value / over.value;
+        Self {
+            value,
+            slope: std::array::from_fn(|i| (self.slope[i] - value * over.slope[i]) / over.value),
+        }
+    }
+
     /// With the current's dependence on the window put in.
     #[must_use]
     pub fn along(self, current: Self) -> Self {

@@ -274,14 +274,17 @@ impl<'a> Problem<'a> {
         };
         let value = |quantity| match quantity {
             CoilQuantity::Resistance => resistance,
-            CoilQuantity::Settling => ratio(response.inductance_h.along(current), resistance)
+            CoilQuantity::Settling => response
+                .inductance_h
+                .along(current)
+                .ratio(resistance)
                 .times(SETTLING_TIME_CONSTANTS),
             CoilQuantity::OuterDiameter => along(2.0 * window.outer_radius_m(), [2.0, 2.0, 0.0]),
             CoilQuantity::InnerDiameter => along(2.0 * window.inner_radius_m, [2.0, 0.0, 0.0]),
             CoilQuantity::Length => along(window.length_m, [0.0, 0.0, 1.0]),
             CoilQuantity::Depth => along(window.depth_m, [0.0, 1.0, 0.0]),
             CoilQuantity::WindingFill => along(1.0, [0.0; 3]),
-            CoilQuantity::Power => product(product(current, current), resistance),
+            CoilQuantity::Power => current.product(current).product(resistance),
             CoilQuantity::Mass => {
                 let mut sum = volume.times(self.strand.mass_per_volume());
                 sum.value += response.core_mass_kg.value;
@@ -291,7 +294,7 @@ impl<'a> Problem<'a> {
             }
             CoilQuantity::WireLength => volume.times(self.strand.length_per_volume()),
             CoilQuantity::CoreField => response.core_field_t.along(current),
-            CoilQuantity::Voltage => product(current, resistance),
+            CoilQuantity::Voltage => current.product(resistance),
             CoilQuantity::Current => current,
         };
         let bounds = self.bounds.iter();
@@ -414,20 +417,5 @@ impl Smooth for Problem<'_> {
 
     fn is_equality(&self, row: usize) -> bool {
         self.bounds[row].name.is_equality()
-    }
-}
-
-fn product(a: Sloped, b: Sloped) -> Sloped {
-    Sloped {
-        value: a.value * b.value,
-        slope: std::array::from_fn(|i| a.slope[i] * b.value + a.value * b.slope[i]),
-    }
-}
-
-fn ratio(a: Sloped, b: Sloped) -> Sloped {
-    let value = a.value / b.value;
-    Sloped {
-        value,
-        slope: std::array::from_fn(|i| (a.slope[i] - value * b.slope[i]) / b.value),
     }
 }

@@ -11,7 +11,7 @@ use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error, number, number_to, percent, si};
 use crate::cli::start::{begin, folder};
@@ -186,8 +186,8 @@ fn of_shape(sheet: &mut Sheet, shape: &ShapeBench) {
         }));
     }
     rows.extend(shape.present().map(|run| row("present settings", run)));
-    let sides = [Side::Left, Side::Right, Side::Right, Side::Right];
-    sheet.raw(&table(&sides, &rows));
+    let sides = "lrrr";
+    sheet.raw(&table(sides, &rows));
     for cheapest in &shape.cheapest {
         let text = named(shape, cheapest);
         sheet.line(&percent(cheapest.target), &text);

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::bundle::bench::{BenchFile, Cheapest, Run, ShapeBench};
 use crate::plot::curves::{CurvesPlot, Line};
-use crate::report::frame::{Page, Section, figure};
+use crate::report::frame::{Page, Section, figure, foot};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
@@ -89,20 +89,21 @@ pub fn html(file: &BenchFile) -> String {
     for shape in &file.shapes {
         lead.element("p class=\"lead\"", &sentence(shape));
     }
-    let inputs = file.inputs.iter();
-    let inputs: Vec<(&str, &str)> = inputs
-        .map(|input| (input.path.as_str(), input.sha256.as_str()))
-        .collect();
     Page {
         kind: "Measurement",
         title: format!("{}: error against processor time", file.design),
         lead,
-        sections: vec![answer(file), curves(file), method(file), sources(&inputs)],
+        sections: vec![
+            answer(file),
+            curves(file),
+            method(file),
+            sources(&file.inputs),
+        ],
         data: Value::Object(data),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself; its numbers are those of bench.csv and \
-             bench.json beside it. Seconds differ from run to run, errors do not.",
-            file.fluxform_version
+        foot: foot(
+            &file.fluxform_version,
+            "; its numbers are those of bench.csv and \
+             bench.json beside it. Seconds differ from run to run, errors do not",
         ),
     }
     .html()

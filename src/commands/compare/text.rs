@@ -2,7 +2,7 @@
 
 use super::{CompareReport, ComparedShape, Place};
 use crate::cli::describe;
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::quantity::{count, force, number_to, percent};
 
 /// The result for people.
@@ -67,9 +67,7 @@ fn table_of(report: &CompareReport) -> String {
             at(pair.feedback_at.as_ref()),
         ]
     }));
-    let mut sides = [Side::Right; 12];
-    sides[..2].fill(Side::Left);
-    table(&sides, &rows)
+    table("llrrrrrrrrrr", &rows)
 }
 
 fn at(place: Option<&Place>) -> String {

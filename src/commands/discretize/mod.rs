@@ -245,11 +245,8 @@ impl PointsOptions {
             holes: Some(holes.name()),
             certify: Some(certify.name()),
             certify_seconds: (certify_seconds != CERTIFY_SECONDS).then_some(certify_seconds),
-            max_deviation_m: None,
-            widest_m: None,
-            spacing_m: None,
-            seed: None,
             surface: surface(document, file),
+            ..PointsAsked::default()
         })
     }
 }

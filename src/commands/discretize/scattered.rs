@@ -31,17 +31,12 @@ impl Sampling {
             Sampling::Poisson { spacing_m, seed } => (None, Some((spacing_m, seed))),
         };
         Options::of(&PointsAsked {
-            weights: None,
-            error: None,
-            refine: false,
-            holes: None,
-            certify: None,
-            certify_seconds: None,
             max_deviation_m: adaptive.map(|(deviation_m, _)| deviation_m),
             widest_m: adaptive.and_then(|(_, widest_m)| widest_m),
             spacing_m: poisson.map(|(spacing_m, _)| spacing_m),
             seed: poisson.map(|(_, seed)| seed),
             surface: surface(document, file),
+            ..PointsAsked::default()
         })
     }
 }

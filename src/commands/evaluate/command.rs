@@ -10,7 +10,7 @@ use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::limit_row;
 use crate::cli::pictures;
 use crate::cli::printer::{Printer, Stream};
@@ -341,5 +341,5 @@ fn limits(result: &Evaluation) -> String {
     let rows: Vec<Vec<String>> = std::iter::once(head)
         .chain(result.limits.iter().map(row))
         .collect();
-    table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
+    table("lrrl", &rows)
 }

@@ -5,7 +5,7 @@ use clap::Args;
 use super::{KeyEntry, KeyList, keys};
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Side, table};
+use crate::cli::layout::table;
 use crate::cli::printer::{Printer, Stream};
 
 /// Print the keys of design and shape files
@@ -54,7 +54,7 @@ fn text(list: &KeyList) -> String {
         }
         text.push_str(&format!("{}, {name}\n", first.document.name()));
         let rows: Vec<Vec<String>> = section.iter().map(row).collect();
-        text.push_str(&table(&[Side::Left; 3], &rows));
+        text.push_str(&table("lll", &rows));
     }
     text
 }

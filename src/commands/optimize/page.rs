@@ -7,7 +7,7 @@ use super::result::Optimization;
 use super::text::better;
 use crate::coil::optimum::LimitUse;
 use crate::coil::optimum::outcome::Alternative;
-use crate::report::frame::{Page, Section};
+use crate::report::frame::{Page, Section, foot};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
 use crate::report::limits::{in_unit, label, words};
@@ -29,11 +29,6 @@ pub fn html(result: &Optimization) -> String {
         (None, None) => "There is no such coil.".to_owned(),
     };
     lead.element("p class=\"lead\"", &text);
-    let inputs: Vec<(&str, &str)> = result
-        .inputs
-        .iter()
-        .map(|input| (input.path.as_str(), input.sha256.as_str()))
-        .collect();
     Page {
         kind: "Optimisation",
         title: format!("The best coil of {}", result.design),
@@ -42,13 +37,10 @@ pub fn html(result: &Optimization) -> String {
             answer(result),
             limits(result),
             sure(result),
-            sources(&inputs),
+            sources(&result.inputs),
         ],
         data: Value::Object(Map::new()),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself.",
-            result.fluxform_version
-        ),
+        foot: foot(result.fluxform_version, ""),
     }
     .html()
 }

@@ -4,7 +4,7 @@ use super::compared::{ComparedCoil, PROPERTIES};
 use super::{BestCoilSummary, GivenCoil, Objective, Optimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::describe;
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::{limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
@@ -277,7 +277,7 @@ fn beside(best: &ComparedCoil, given: Option<&ComparedCoil>) -> String {
         let cells = [best].into_iter().chain(given).map(cell);
         std::iter::once(label(key)).chain(cells).collect()
     }));
-    table(&[Side::Left, Side::Right, Side::Right], &rows)
+    table("lrr", &rows)
 }
 
 fn limits(result: &Optimization) -> String {
@@ -291,7 +291,7 @@ fn limits(result: &Optimization) -> String {
         };
         rows.push(limit_row(name, used.value, used.limit, state));
     }
-    table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
+    table("lrrl", &rows)
 }
 
 fn alternatives(list: &[Alternative]) -> String {
@@ -325,10 +325,7 @@ fn alternatives(list: &[Alternative]) -> String {
             better(other),
         ]);
     }
-    let mut sides = [Side::Right; 9];
-    sides[0] = Side::Left;
-    sides[8] = Side::Left;
-    table(&sides, &rows)
+    table("lrrrrrrrl", &rows)
 }
 
 /// The first, the last, and those evenly between.

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::ReplayReport;
 use super::summary::ErrorSummary;
 use crate::bundle::replay::FingerRows;
-use crate::report::frame::{Page, Section, figure};
+use crate::report::frame::{Page, Section, figure, foot};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
 use crate::report::number::{figures, percent};
@@ -44,11 +44,6 @@ pub fn html(report: &ReplayReport, below: &Below) -> String {
     for warning in &summary.warnings {
         lead.element("p class=\"note\"", warning);
     }
-    let inputs: Vec<(&str, &str)> = summary
-        .inputs
-        .iter()
-        .map(|input| (input.path.as_str(), input.sha256.as_str()))
-        .collect();
     let every = every(report.rows.len());
     let mut data = Map::new();
     data.insert("replay".to_owned(), moments(report, below, every));
@@ -56,12 +51,9 @@ pub fn html(report: &ReplayReport, below: &Below) -> String {
         kind: "Replay",
         title: format!("{} on {}", summary.shape, summary.design),
         lead,
-        sections: vec![moment(every), whole(report), sources(&inputs)],
+        sections: vec![moment(every), whole(report), sources(&summary.inputs)],
         data: Value::Object(data),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself.",
-            summary.fluxform_version
-        ),
+        foot: foot(summary.fluxform_version, ""),
     }
     .html()
 }

@@ -6,7 +6,7 @@ use super::{Check, Verifier, VerifyOptions, VerifyReport};
 use crate::cli::budget::announce;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error};
 use crate::cli::start::begin;
@@ -128,6 +128,6 @@ fn checks_table(checks: &[Check]) -> String {
     let rows: Vec<Vec<String>> = std::iter::once(head.to_vec())
         .chain(checks.iter().map(row))
         .collect();
-    let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
-    table(&sides, &rows)
+    let sides = "lrrll";
+    table(sides, &rows)
 }

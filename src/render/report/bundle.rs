@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::array::views;
 use super::data::{CalibratedObject, DrivenCoil};
-use super::frame::{Page, Section};
+use super::frame::{Page, Section, foot};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
 use super::{directions, error_budget, field, limits, path, surface, uncertainty};
@@ -43,10 +43,10 @@ pub fn page(object: &CalibratedObject, files: &[&str]) -> String {
         lead: lead(object),
         sections,
         data: Value::Object(data),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself; all its numbers come from the files \
-             of this bundle.",
-            file.fluxform_version
+        foot: foot(
+            &file.fluxform_version,
+            "; all its numbers come from the files \
+             of this bundle",
         ),
     }
     .html()

@@ -29,6 +29,12 @@ pub struct Section {
     pub body: Html,
 }
 
+/// The last line of a page that this `version` made: it needs nothing else, and `more`.
+#[must_use]
+pub fn foot(version: &str, more: &str) -> String {
+    format!("fluxform {version}. This page needs nothing but itself{more}.")
+}
+
 /// A page before it is put together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page {

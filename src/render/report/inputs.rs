@@ -2,13 +2,15 @@
 
 use super::frame::Section;
 use super::html::{Cell, Html, Table};
+use fluxform_bundle::artefact::Input;
 
 /// Path and digest of every input.
 #[must_use]
-pub fn sources(inputs: &[(&str, &str)]) -> Section {
+pub fn sources(inputs: &[Input]) -> Section {
     let mut body = Html::default();
-    let row =
-        |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };
+    let row = |input: &Input| -> Vec<Cell> {
+        vec![input.path.as_str().into(), input.sha256.as_str().into()]
+    };
     body.table(&Table {
         caption: "Files and their digests".to_owned(),
         head: vec![("file", false), ("sha256", false)],

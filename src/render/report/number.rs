@@ -3,7 +3,7 @@
 const PREFIXES: [(i32, &str); 8] = [
     (-12, "p"),
     (-9, "n"),
-    (-6, "\u{b5}"),
+    (-6, "u"),
     (-3, "m"),
     (0, ""),
     (3, "k"),
@@ -11,19 +11,37 @@ const PREFIXES: [(i32, &str); 8] = [
     (9, "G"),
 ];
 
-/// `value` rounded to `digits` significant digits, without zeros at its end.
+/// The prefix for a number of this power of ten, in ASCII, and its own.
+#[must_use]
+pub fn prefix_of(exponent: i32) -> (i32, &'static str) {
+    PREFIXES
+        .into_iter()
+        .rev()
+        .find(|(power, _)| *power <= exponent)
+        .unwrap_or(PREFIXES[0])
+}
+
+/// `value` rounded to `digits` significant digits, without zeros at its end; what is not finite as a dash.
 #[must_use]
 pub fn figures(value: f64, digits: usize) -> String {
+    if value.is_finite() {
+        plain(value, digits)
+    } else {
+        "\u{2013}".to_owned()
+    }
+}
+
+/// The same of any value, in ASCII.
+#[must_use]
+pub fn plain(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    if !value.is_finite() {
-        return "\u{2013}".to_owned();
-    }
+    // Through the decimal digits: they show the exponent after rounding.
     let rounded = format!("{:.*e}", digits.max(1) - 1, value);
     let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
-    if !(-4..6).contains(&exponent) {
+    if !(-4..digits.max(6) as i32).contains(&exponent) {
         return format!("{}e{exponent}", trimmed(mantissa));
     }
     let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
@@ -48,12 +66,8 @@ pub fn si(value: f64, unit: &str) -> String {
     let exponent = rounded.abs().log10().floor() as i32;
     // Thousandths of a kilogram are grams.
     let (unit, shift) = if unit == "kg" { ("g", 3) } else { (unit, 0) };
-    let power = PREFIXES
-        .into_iter()
-        .rev()
-        .find(|(power, _)| *power <= exponent + shift)
-        .unwrap_or(PREFIXES[0]);
-    let (power, prefix) = power;
+    let (power, prefix) = prefix_of(exponent + shift);
+    let prefix = if prefix == "u" { "\u{b5}" } else { prefix };
     let scaled = value * 10f64.powi(shift - power);
     format!("{} {prefix}{unit}", figures(scaled, 4))
 }

@@ -2,12 +2,13 @@
 
 use serde_json::{Map, Value, json};
 
-use super::frame::{Page, Section, figure};
+use super::frame::{Page, Section, figure, foot};
 use super::html::Html;
 use super::inputs::sources;
 use super::number::{force, si};
 use super::pack::f32s;
 use crate::plot::pareto::ParetoPlot;
+use fluxform_bundle::artefact::Input;
 
 /// Designs that are listed; the table beside has all.
 const LISTED: usize = 200;
@@ -20,7 +21,7 @@ pub struct SweepFacts<'a> {
     /// Program that made it.
     pub version: &'a str,
     /// Path and digest of what went in.
-    pub inputs: Vec<(&'a str, &'a str)>,
+    pub inputs: &'a [Input],
     /// Designs of the plan, rows, missing, failed, inaccurate, within their limits.
     pub counts: [u64; 6],
     /// Whether the best are among those within their limits alone.
@@ -98,13 +99,10 @@ pub fn page(facts: &SweepFacts) -> String {
                 title: "Limits",
                 body: limits,
             },
-            sources(&facts.inputs),
+            sources(facts.inputs),
         ],
         data: drawn(facts),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself.",
-            facts.version
-        ),
+        foot: foot(facts.version, ""),
     }
     .html()
 }

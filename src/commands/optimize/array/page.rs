@@ -8,7 +8,7 @@ use crate::coil::array_search::search::SearchedChoice;
 use crate::coil::array_search::study::{LimitWorth, Neighbour, Study, VariableStudy};
 use crate::coil::limits::LimitCheck;
 use crate::report::array::views;
-use crate::report::frame::{Page, Section};
+use crate::report::frame::{Page, Section, foot};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
 use crate::report::limits::{in_unit, words};
@@ -32,11 +32,6 @@ pub fn html(result: &ArrayOptimization) -> String {
         figures(result.gain, 4)
     );
     lead.element("p class=\"lead\"", &text);
-    let inputs: Vec<(&str, &str)> = result
-        .inputs
-        .iter()
-        .map(|input| (input.path.as_str(), input.sha256.as_str()))
-        .collect();
     let sections = [
         Some(answer(result)),
         arrays(result),
@@ -44,7 +39,7 @@ pub fn html(result: &ArrayOptimization) -> String {
         result.study.as_ref().map(|study| variables(result, study)),
         limits(result),
         Some(sure(result)),
-        Some(sources(&inputs)),
+        Some(sources(&result.inputs)),
     ];
     Page {
         kind: "Optimisation",
@@ -52,10 +47,7 @@ pub fn html(result: &ArrayOptimization) -> String {
         lead,
         sections: sections.into_iter().flatten().collect(),
         data: Value::Object(Map::new()),
-        foot: format!(
-            "fluxform {}. This page needs nothing but itself.",
-            result.fluxform_version
-        ),
+        foot: foot(result.fluxform_version, ""),
     }
     .html()
 }

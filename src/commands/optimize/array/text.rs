@@ -3,7 +3,7 @@
 use super::physics::{Constant, OtherAim};
 use super::{ArrayEnding, ArrayOptimization};
 use crate::accuracy::CertificateKind;
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::limit_row;
 use crate::cli::quantity::{count, number, percent, si};
 use crate::cli::values::FileArgument;
@@ -132,7 +132,7 @@ fn shapes(result: &ArrayOptimization) -> String {
     let rows: Vec<_> = std::iter::once(head)
         .chain(result.shapes.iter().map(row))
         .collect();
-    table(&[Side::Left, Side::Right, Side::Right, Side::Right], &rows)
+    table("lrrr", &rows)
 }
 
 fn variables(result: &ArrayOptimization) -> String {
@@ -142,7 +142,7 @@ fn variables(result: &ArrayOptimization) -> String {
             .iter()
             .map(|(key, value)| vec![key.clone(), number(*value)])
             .collect();
-        return table(&[Side::Left, Side::Right], &rows);
+        return table("lr", &rows);
     };
     let head = ["variable", "given", "best", "within 1 %", "bought"]
         .map(str::to_owned)
@@ -162,16 +162,7 @@ fn variables(result: &ArrayOptimization) -> String {
         ]
     });
     let rows: Vec<_> = std::iter::once(head).chain(rows).collect();
-    table(
-        &[
-            Side::Left,
-            Side::Right,
-            Side::Right,
-            Side::Right,
-            Side::Right,
-        ],
-        &rows,
-    )
+    table("lrrrr", &rows)
 }
 
 fn limits(result: &ArrayOptimization) -> String {
@@ -181,10 +172,7 @@ fn limits(result: &ArrayOptimization) -> String {
         let state = before.map_or_else(|| state.to_owned(), |_| format!("{state}, missed before"));
         limit_row(key, check.value, check.limit, &state)
     });
-    table(
-        &[Side::Left, Side::Right, Side::Right, Side::Left],
-        &rows.collect::<Vec<_>>(),
-    )
+    table("lrrl", &rows.collect::<Vec<_>>())
 }
 
 fn neighbours(result: &ArrayOptimization, study: &Study) -> String {
@@ -201,8 +189,5 @@ fn neighbours(result: &ArrayOptimization, study: &Study) -> String {
             values.join(", "),
         ]
     });
-    table(
-        &[Side::Left, Side::Left, Side::Left],
-        &rows.collect::<Vec<_>>(),
-    )
+    table("lll", &rows.collect::<Vec<_>>())
 }

@@ -9,7 +9,7 @@ use crate::bundle::scan::{Explanation, FitFile, Left, ScanFile, ScanPlace};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, table};
 use crate::cli::pictures::{Picture, table_or_drawing};
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, number, number_to, percent, si};
@@ -276,7 +276,7 @@ fn scales(fit: &FitFile) -> String {
             shown(scale.gain),
         ]);
     }
-    table(&[Side::Right; 4], &rows)
+    table("rrrr", &rows)
 }
 
 fn explained(found: Option<&Explanation>, name: &str) -> String {
@@ -318,14 +318,5 @@ fn explanations(list: &[Explanation]) -> String {
             error,
         ]);
     }
-    table(
-        &[
-            Side::Left,
-            Side::Right,
-            Side::Right,
-            Side::Right,
-            Side::Right,
-        ],
-        &rows,
-    )
+    table("lrrrr", &rows)
 }

@@ -32,11 +32,7 @@ pub(super) fn html(
     page(&SweepFacts {
         design: &summary.design,
         version: &summary.fluxform_version,
-        inputs: summary
-            .inputs
-            .iter()
-            .map(|input| (input.path.as_str(), input.sha256.as_str()))
-            .collect(),
+        inputs: &summary.inputs,
         counts: [
             summary.points,
             summary.rows,
