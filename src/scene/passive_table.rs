@@ -113,7 +113,7 @@ impl Nodes {
             Ordering::Equal => 0.0,
             Ordering::Greater => -angle(count - 1 - k).cos(),
         };
-        let share = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 } * angle(k).sin();
+        let share = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 } * angle(k).sin();
         Self {
             at: (0..count).map(|k| middle + half * unit(k)).collect(),
             shares: (0..count).map(share).collect(),
