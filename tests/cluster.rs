@@ -1,5 +1,5 @@
-//! A sweep as a cluster runs it: GNU parallel and a Slurm of its own, each killed half way and
-//! begun again.
+//! A sweep and a coupled array as a cluster runs them: GNU parallel and a Slurm of its own, each killed half
+//! way and begun again, and Snakemake.
 #![allow(clippy::print_stderr)] // what the script reports
 
 use std::process::{Command, ExitCode};
@@ -11,6 +11,7 @@ fn main() -> ExitCode {
     needs::run(trials! {
         needs::tool("parallel") => [shards_under_gnu_parallel],
         needs::tool("sbatch") => [a_job_array_under_slurm],
+        needs::tool("snakemake") => [workflows_under_snakemake],
     })
 }
 
@@ -35,4 +36,8 @@ fn shards_under_gnu_parallel() {
 
 fn a_job_array_under_slurm() {
     run("slurm");
+}
+
+fn workflows_under_snakemake() {
+    run("snakemake");
 }

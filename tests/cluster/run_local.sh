@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
-# A small sweep as a cluster would run it, on this machine: with GNU parallel, and as a Slurm job
-# array under a Slurm of its own, started for this test and stopped at its end. Each is killed half
-# way, begun again, and compared byte for byte with the sweep in one piece.
+# A small sweep as a cluster would run it, on this machine: with GNU parallel, as a Slurm job array
+# under a Slurm of its own, started for this test and stopped at its end, and as Snakemake's workflow.
+# The first two are killed half way and begun again; all are compared byte for byte with the sweep in one
+# piece, and so are the drives of a coupled array in two parts.
 #
-#   tests/cluster/run_local.sh path/to/fluxform [parallel|slurm]
+#   tests/cluster/run_local.sh path/to/fluxform [parallel|slurm|snakemake]
 #
-# Says "skipped: ..." for what cannot run here (Debian: apt-get install slurm-wlm parallel; the
-# daemons need root). Ends with 0 when all that ran agreed.
+# Says "skipped: ..." for what cannot run here (Debian: apt-get install slurm-wlm parallel, the
+# daemons need root; pip install snakemake). Ends with 0 when all that ran agreed.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
-fluxform=$(realpath "${1:?usage: run_local.sh FLUXFORM [parallel|slurm]}")
+fluxform=$(realpath "${1:?usage: run_local.sh FLUXFORM [parallel|slurm|snakemake]}")
 only=${2:-}
 export FLUXFORM=$fluxform
 work=$(mktemp -d)
@@ -178,8 +179,12 @@ write_array() {
 
 # Calibrates in folder $1, whose blocks are there, and compares the bundles.
 compare_array() {
-    local file
     "$fluxform" -q calibrate wide.toml flat.toml --tolerance 1e-2 --threads 1 --out "$1"
+    compare_bundles "$1"
+}
+
+compare_bundles() {
+    local file
     for file in manifest.json map.npz lambda.json points.csv currents.csv; do
         cmp "array_whole/seed/flat/$file" "$1/seed/flat/$file"
     done
@@ -204,7 +209,28 @@ array_with_slurm() {
     say "slurm: the drives of an array in two parts, the same bytes"
 }
 
+with_snakemake() {
+    if ! command -v snakemake >/dev/null; then
+        say "skipped: Snakemake is not installed"
+        return
+    fi
+    local set="target.height_mm=10:59.9:0.1 coil.turns=700,1300,1429 coil.inner_diameter_mm=20,24"
+    snakemake -q all -s "$root/scripts/Snakefile" --cores 2 --config fluxform="$fluxform -q" \
+        design=seed_air.toml shards=3 out=by_snakemake.d set="$set"
+    cmp plan.json by_snakemake.d/plan.json
+    for file in sweep.csv sweep.svg sweep_pareto.csv; do
+        cmp "whole.d/$file" "by_snakemake.d/$file"
+    done
+    say "snakemake: the sweep in three parts, the same bytes"
+    snakemake -q all -s "$root/scripts/Snakefile_calibrate" --cores 2 --config fluxform="$fluxform -q" \
+        design=wide.toml shapes=flat.toml shards=2 out=array_snakemake options="--tolerance 1e-2"
+    compare_bundles array_snakemake
+    say "snakemake: the drives of an array in two parts, the same bytes"
+}
+
 write_array
-[ "$only" = slurm ] || with_parallel
-[ "$only" = slurm ] || array_with_parallel
-[ "$only" = parallel ] || with_slurm
+case $only in
+    "" | parallel) with_parallel && array_with_parallel ;;&
+    "" | slurm) with_slurm ;;&
+    "" | snakemake) with_snakemake ;;
+esac
