@@ -15,6 +15,10 @@ use super::real::Real;
 const CHUNK_ROWS: usize = 256;
 /// Chunks of one parallel task.
 const GROUP_CHUNKS: usize = 64;
+/// Squares of what is left of a column up to which it is nothing. Where columns depend on others, as where
+/// they are more than the rows, rounding is left, and of the next one the rounding of that, down to where
+/// squares underflow and reflections are not finite.
+const NOTHING: f64 = 1e-200;
 
 /// An upper triangular factor: column `j` holds its entries `0..=j`, the rest is zero.
 #[derive(Debug, Clone)]
@@ -58,7 +62,7 @@ impl<T: Real> Triangle<T> {
             let (head, tail) = block.split_at_mut((j + 1) * stride);
             let v = &head[j * stride..j * stride + rows];
             let below = T::dot(v, v);
-            if below <= T::ZERO {
+            if below <= T::of(NOTHING) {
                 continue;
             }
             let alpha = self.entries[j * n + j];
@@ -82,8 +86,8 @@ impl<T: Real> Triangle<T> {
 /// R of `A = QR`, `A` of `rows` rows and `columns` columns (`rows` may be the smaller).
 ///
 /// `fill(range, block, stride)` writes rows `range` of `A` into `block` column by
-/// column, columns `stride` apart. Entries should be of order one at most, with their
-/// squares far from overflow. Signs of R's diagonal are arbitrary.
+/// column, columns `stride` apart. The largest entries of a column should be of order one. Signs of R's
+/// diagonal are arbitrary.
 pub fn triangular_factor<T: Real>(
     rows: usize,
     columns: usize,
@@ -165,6 +169,17 @@ mod tests {
                 double < 1e-30 * (1.0 + rows as f64 / 1e3),
                 "{rows} x {columns}: {double:e}"
             );
+        }
+    }
+
+    /// Of more columns than rows, what was left of the last ones underflowed to what is no number.
+    #[test]
+    fn many_columns_of_few_rows_have_the_gram_matrix_too() {
+        for (rows, columns) in [(9, 50), (9, 400), (3, 30), (1, 200)] {
+            let plain = gram_error::<f64>(rows, columns);
+            let double = gram_error::<DoubleDouble>(rows, columns);
+            assert!(plain < 1e-13, "{rows} x {columns}: {plain:e}");
+            assert!(double < 1e-29, "{rows} x {columns}: {double:e}");
         }
     }
 

@@ -280,3 +280,31 @@ fn thousands_of_points_do_not_wear_the_sums_down() {
         bits(pool(3).install(|| case.solve()))
     );
 }
+
+/// Of many more coils than points the reduction once held what is no number, and nothing was rendered.
+#[test]
+fn more_coils_than_points_render_more_than_fewer() {
+    let points = flat_points(3, 0.03);
+    let mut before = 0.0;
+    for side in [3, 5, 7, 9] {
+        let solution = array_case(&square_array(side, 0.025), &points).solve();
+        assert_eq!(
+            (solution.status, solution.rank),
+            (Status::Solved, points.len()),
+            "{side}"
+        );
+        let linear = solution.constants.lambda_linear_n_per_m;
+        let linear = linear.unwrap_or_else(|| panic!("{side}: nothing is rendered"));
+        // The inner coils are those of the smaller array.
+        assert!(
+            linear >= before * (1.0 - 1e-12),
+            "{side}: {linear} {before}"
+        );
+        let error_n = solution.path.error_n2(linear).sqrt();
+        assert!(
+            side == 3 || error_n < 1e-12 * linear * 0.03,
+            "{side}: {error_n:e}"
+        );
+        before = linear;
+    }
+}
