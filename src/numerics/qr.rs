@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// Of more columns than rows, what was left of the last ones underflowed to what is no number.
+    /// Of more columns than rows, what was left of the last ones underflowed to NaN.
     #[test]
     fn many_columns_of_few_rows_have_the_gram_matrix_too() {
         for (rows, columns) in [(9, 50), (9, 400), (3, 30), (1, 200)] {

@@ -112,7 +112,7 @@ pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, Ru
     of_cores(&pulled, LEFT_OUT_TOLERANCE).map(Some)
 }
 
-/// Vertical pull at `places_m` from [`left_out`], N; about as exact, and as exact where it is strongest.
+/// Vertical pull at `places_m` from [`left_out`], N: from a table, and from the pull itself where it is strongest.
 pub(super) fn left_out_z_n(scene: &Scene, pull: &Pull, places_m: &[[f64; 3]]) -> Vec<f64> {
     scattered_z_n(
         scene,

@@ -281,7 +281,7 @@ fn thousands_of_points_do_not_wear_the_sums_down() {
     );
 }
 
-/// Of many more coils than points the reduction once held what is no number, and nothing was rendered.
+/// Of many more coils than points the reduction once held NaN, and nothing was rendered.
 #[test]
 fn more_coils_than_points_render_more_than_fewer() {
     let points = flat_points(3, 0.03);
