@@ -260,6 +260,7 @@ mod tests {
             model: &coils,
             bounds: &free,
             condition: None,
+            start: None,
         };
         let mut path = follower.path(None, &numbers(&[0.0, 1.0]));
         // Half a thousand amperes a unit, and as much the other way.

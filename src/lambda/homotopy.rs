@@ -114,12 +114,21 @@ fn advance(value: &[Num], rate: &[Num], by: Num) -> Vec<Num> {
     value.iter().zip(rate).map(|(&v, &r)| v + by * r).collect()
 }
 
+/// Variables, a slack's last, that give the target at this lambda exactly, within the bounds.
+#[derive(Debug, Clone)]
+pub(super) struct ExactStart {
+    pub lambda: Num,
+    pub x: Vec<Num>,
+}
+
 /// A problem whose path is followed.
 pub(super) struct Follower<'a> {
     pub model: &'a Model,
     pub bounds: &'a Bounds,
     /// Condition number of the columns where it is known.
     pub condition: Option<f64>,
+    /// Where the path goes straight, without an offset.
+    pub start: Option<ExactStart>,
 }
 
 impl Follower<'_> {
@@ -147,18 +156,19 @@ impl Follower<'_> {
         slope: &[Num],
     ) -> (Trace, B) {
         let count = self.model.count();
+        let mut x = vec![Num::ZERO; count];
+        if self.model.weight.is_some() {
+            x[count - 1] = self.bounds.total;
+        }
         let mut state = State {
             lambda: Num::ZERO,
-            place: (0..count).map(|i| self.place_of_zero(i)).collect(),
-            x: vec![Num::ZERO; count],
+            place: (0..count).map(|i| self.place_of(i, x[i])).collect(),
+            x,
             x_rate: vec![Num::ZERO; count],
             gradient: vec![Num::ZERO; count],
             gradient_rate: vec![Num::ZERO; count],
             gradient_scale: self.model.norm.clone(),
         };
-        if self.model.weight.is_some() {
-            state.x[count - 1] = self.bounds.total;
-        }
         let mut target = Target::along(slope);
         let mut arrived = true;
         if let Some(offset) = offset {
@@ -177,20 +187,54 @@ impl Follower<'_> {
             target.constant = offset.to_vec();
         }
         let mut basis = basis(target);
+        let straight = self.start.as_ref().map(|start| {
+            let piece = self.straight(&state, start, &basis);
+            state = self.reached(&piece, start);
+            piece
+        });
         let mut trace = self.follow(state, &mut basis, None);
+        trace.pieces.splice(0..0, straight);
         trace.complete &= arrived;
         trace.flaw = self.flaw(&trace.pieces, offset, slope);
         (trace, basis)
     }
 
-    fn place_of_zero(&self, i: usize) -> VariableState {
-        let lower = self.bounds.lower[i];
-        let value = if self.model.weight.is_some() && i + 1 == self.model.count() {
-            self.bounds.total
-        } else {
-            Num::ZERO
+    /// The piece from `state`, where nothing flows, to `start`.
+    fn straight(&self, state: &State, start: &ExactStart, basis: &impl Basis) -> Piece {
+        let rate = |(&to, &from): (&Num, &Num)| (to - from) / start.lambda;
+        let x_rate: Vec<Num> = start.x.iter().zip(&state.x).map(rate).collect();
+        let place = |i: usize| match state.place[i] {
+            VariableState::Low | VariableState::High if x_rate[i] != Num::ZERO => {
+                VariableState::Free
+            }
+            place => place,
         };
-        match (lower, self.bounds.upper[i]) {
+        Piece {
+            place: (0..x_rate.len()).map(place).collect(),
+            residual: vec![Num::ZERO; self.model.rows],
+            residual_rate: vec![Num::ZERO; self.model.rows],
+            x_rate,
+            ..self.standstill(state, basis.target())
+        }
+    }
+
+    /// Where that piece ends.
+    fn reached(&self, piece: &Piece, start: &ExactStart) -> State {
+        let count = self.model.count();
+        State {
+            lambda: start.lambda,
+            place: (0..count).map(|i| self.place_of(i, start.x[i])).collect(),
+            x: start.x.clone(),
+            x_rate: piece.x_rate.clone(),
+            gradient: vec![Num::ZERO; count],
+            gradient_rate: vec![Num::ZERO; count],
+            gradient_scale: piece.gradient_scale.clone(),
+        }
+    }
+
+    /// Where a variable of a value within its bounds is.
+    fn place_of(&self, i: usize, value: Num) -> VariableState {
+        match (self.bounds.lower[i], self.bounds.upper[i]) {
             (Some(lower), Some(upper)) if upper <= lower => VariableState::Pinned,
             (Some(lower), _) if value <= lower => VariableState::Low,
             (_, Some(upper)) if value >= upper => VariableState::High,
@@ -480,7 +524,7 @@ impl Follower<'_> {
         worst.to_f64()
     }
 
-    /// A piece that stays where `state` is: only for a path that could not begin.
+    /// A piece that stays where `state` is.
     fn standstill(&self, state: &State, target: &Target) -> Piece {
         let values = state.x.iter().copied().enumerate();
         let (rest, _) = self
@@ -525,6 +569,7 @@ mod tests {
             model: &model,
             bounds: &bounds,
             condition: None,
+            start: None,
         };
         let path = |size: f64| follower.path(None, &numbers(&[0.7 * size, 1.9 * size, 1.6 * size]));
         let one = path(1.0);

@@ -54,6 +54,7 @@ mod certificate;
 mod cone;
 mod criteria;
 pub mod enclosure;
+mod exact_start;
 pub mod feedback;
 mod given;
 mod homotopy;

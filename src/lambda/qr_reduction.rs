@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::gram::triangular_factor_by_products;
-use fluxform_numerics::qr::{Triangle, triangular_factor};
+use fluxform_numerics::qr::triangular_factor;
 use fluxform_numerics::real::Real;
 
 use super::homotopy::Bounds;
@@ -76,7 +76,8 @@ pub(super) fn largest_entries(problem: &ForceProblem) -> Vec<f64> {
 /// The triangular factor and the exponents of its columns' scales.
 #[derive(Debug, Clone)]
 pub(super) struct Reduced {
-    /// R of `[G, h, -offset] / sqrt(n)`, column i divided by `2^scale[i]`.
+    /// R of `[G, h, -offset] / sqrt(n)`, or the matrix itself where points are fewer than coils; column i
+    /// divided by `2^scale[i]`.
     columns: Vec<Vec<Num>>,
     /// Powers of two, of order of each column's root mean square.
     scale: Vec<i32>,
@@ -126,18 +127,26 @@ impl Reduced {
     pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
         let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
         let heaviest = T::of(problem.heaviest());
-        let triangle: Triangle<T> =
-            triangular_factor(problem.points(), largest.len(), |range, block, stride| {
-                fill_rows(problem, &exponents, range.clone(), block, stride);
-                let Some(weights) = problem.weights else {
-                    return;
-                };
-                for column in block.chunks_exact_mut(stride) {
-                    for (entry, &weight) in column.iter_mut().zip(&weights[range.clone()]) {
-                        *entry = *entry * (T::of(weight) / heaviest).sqrt();
-                    }
+        let fill = |range: Range<usize>, block: &mut [T], stride: usize| {
+            fill_rows(problem, &exponents, range.clone(), block, stride);
+            let Some(weights) = problem.weights else {
+                return;
+            };
+            for column in block.chunks_exact_mut(stride) {
+                for (entry, &weight) in column.iter_mut().zip(&weights[range.clone()]) {
+                    *entry = *entry * (T::of(weight) / heaviest).sqrt();
                 }
-            });
+            }
+        };
+        let (points, width) = (problem.points(), largest.len());
+        // Of fewer points than coils the rows themselves are the least that says everything.
+        let (rows, columns) = if points < problem.coils() {
+            let mut block = vec![T::ZERO; points * width];
+            fill(0..points, &mut block, points);
+            (points, block)
+        } else {
+            (width, triangular_factor(points, width, fill).into_columns())
+        };
         let total = match problem.weights {
             None => Num::of(problem.points() as f64),
             Some(weights) => {
@@ -146,7 +155,13 @@ impl Reduced {
                 weights.iter().fold(Num::ZERO, sum)
             }
         };
-        Self::of_triangle(problem, largest, &triangle, total, T::EPSILON)
+        Self::of_columns(
+            problem,
+            largest,
+            columns.chunks_exact(rows),
+            total,
+            T::EPSILON,
+        )
     }
 
     /// By the products of the columns, in double-double: quicker, for coils' columns of this condition
@@ -174,16 +189,16 @@ impl Reduced {
             }
         };
         let epsilon = Num::EPSILON * condition;
-        Some(Self::of_triangle(
-            problem, largest, &triangle, total, epsilon,
-        ))
+        let columns = triangle.into_columns();
+        let columns = columns.chunks_exact(largest.len());
+        Some(Self::of_columns(problem, largest, columns, total, epsilon))
     }
 
-    /// From R of the scaled rows, whose weights add up to `total`.
-    fn of_triangle<T: Real>(
+    /// From the columns that the scaled rows, whose weights add up to `total`, are turned to.
+    fn of_columns<'a, T: Real + 'a>(
         problem: &ForceProblem,
         largest: &[f64],
-        triangle: &Triangle<T>,
+        turned: impl Iterator<Item = &'a [T]>,
         total: Num,
         epsilon: f64,
     ) -> Self {
@@ -191,12 +206,8 @@ impl Reduced {
         let root = Num::ONE / total.sqrt();
         let mut scale = Vec::with_capacity(largest.len());
         let mut columns = Vec::with_capacity(largest.len());
-        for (j, &most) in largest.iter().enumerate() {
-            let column: Vec<Num> = triangle
-                .column(j)
-                .iter()
-                .map(|&v| v.widened() * root)
-                .collect();
+        for (&most, column) in largest.iter().zip(turned) {
+            let column: Vec<Num> = column.iter().map(|&v| v.widened() * root).collect();
             let more = exponent_of(Num::dot(&column, &column).sqrt().to_f64());
             let factor = Num::of(power_of_two(-more));
             columns.push(column.into_iter().map(|v| v * factor).collect());
@@ -220,7 +231,7 @@ impl Reduced {
     }
 
     fn rows(&self) -> usize {
-        self.columns.len()
+        self.columns[0].len()
     }
 
     fn model(&self, weight: Option<Vec<Num>>) -> Model {

@@ -1,5 +1,7 @@
 //! The whole of eq. 9 and 10 for one object: precision, path, criteria, certificate.
 
+use std::cell::Cell;
+
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::{Criterion, ForceConstants};
 use fluxform_base::units::DETECTION_THRESHOLD_N;
@@ -8,6 +10,7 @@ use fluxform_numerics::real::Real;
 
 use super::certificate;
 use super::criteria::Comparison;
+use super::exact_start::exact_start;
 use super::homotopy::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
@@ -22,6 +25,8 @@ const PLAIN_CONDITION: f64 = 1e3;
 const INDEPENDENT: f64 = 1e10;
 /// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
 const PLAIN_ERROR: f64 = 2e-14;
+/// Share of lambda^2 mean(h^2) by which the currents' error may be above e*, or the path is wrong.
+const AGREES: f64 = 1e-8;
 /// Largest relative violation of optimality that is taken for rounding: its square counts.
 const FLAW: f64 = 1e-8;
 
@@ -34,7 +39,8 @@ pub enum Status {
     NothingWanted,
     /// No current within the limits' signs brings the force nearer to the requested one.
     NothingRendered,
-    /// The path could not be followed to its end; numbers beyond its last breakpoint are not the minimum.
+    /// The path could not be followed to its end, so that numbers beyond its last breakpoint are not the
+    /// minimum, or the error of its currents is not the path's.
     Stalled,
 }
 
@@ -116,6 +122,7 @@ impl Unlimited {
             model: &model,
             bounds: &bounds,
             condition,
+            start: None,
         };
         let trace = follower.path(reduced.offset().as_deref(), reduced.heights());
         let error = rounding(&model, &trace, reduced.heights());
@@ -143,10 +150,12 @@ impl Solved {
         let offset = reduced.offset();
         let heights = reduced.heights();
         let (model, bounds) = reduced.limited(problem);
+        let rate = &free.trace.pieces[0].residual_rate;
         let follower = Follower {
             model: &model,
             bounds: &bounds,
             condition,
+            start: exact_start(problem, &reduced, (&model, &bounds), rate),
         };
         let mut limited = follower.path(offset.as_deref(), heights);
         let mut error = rounding(&model, &limited, heights).max(free.error);
@@ -417,10 +426,15 @@ fn finish<T: Real>(
         .copied()
         .fold(f64::INFINITY, f64::min);
     let rms_height_m = comparison.mean_square.sqrt().to_f64() * solved.reduced.height_unit_m();
+    let agrees = Cell::new(true);
     let given = |lambda: f64, currents_a: Vec<f64>, error_n2: Option<f64>| {
         let check = certificate::check::<T>(problem, lambda, &currents_a);
-        let rms_error_n = error_n2.unwrap_or(check.mean_square_n2).sqrt();
         let scale = lambda * rms_height_m;
+        let error_n2 = error_n2.unwrap_or(check.mean_square_n2);
+        let rms_error_n = error_n2.sqrt();
+        if check.mean_square_n2 - error_n2 > AGREES * (scale * scale + error_n2) {
+            agrees.set(false);
+        }
         OperatingPoint {
             lambda_n_per_m: lambda,
             currents_a,
@@ -448,15 +462,20 @@ fn finish<T: Real>(
         }
         (_, criterion) => constants.of(criterion).map(evaluate),
     };
+    let at = settings.at_n_per_m.map(evaluate);
     Solution {
         constants,
         maxmin_points: maxmin.map_or_else(Vec::new, |maxmin| {
             maxmin.active.iter().map(|active| active.point).collect()
         }),
         chosen,
-        at: settings.at_n_per_m.map(evaluate),
+        at,
         rank,
-        status,
+        status: if agrees.get() {
+            status
+        } else {
+            Status::Stalled
+        },
         precision,
         accuracy: StageAccuracy {
             estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,

@@ -369,6 +369,7 @@ mod tests {
                 model: &self.model,
                 bounds: &self.bounds,
                 condition,
+                start: None,
             };
             follower.path(self.offset.as_deref(), &self.slope)
         }

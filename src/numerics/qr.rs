@@ -53,6 +53,12 @@ impl<T: Real> Triangle<T> {
         &self.entries[j * self.size..(j + 1) * self.size]
     }
 
+    /// All columns one after another, `size` entries each.
+    #[must_use]
+    pub fn into_columns(self) -> Vec<T> {
+        self.entries
+    }
+
     /// Replaces this factor by that of itself over `block`: `rows` rows stored
     /// column by column, `stride` apart. The block is overwritten.
     fn absorb(&mut self, block: &mut [T], rows: usize, stride: usize) {

@@ -6,12 +6,16 @@
 //! with one it is convex too, and below the chord between any two of its values.
 
 use super::doubles::{Doubles, Failure};
-use super::scaled::{Form, Scaled};
+use super::scaled::{Form, Limits, Scaled};
+use crate::problem::ForceProblem;
+use crate::qr_reduction::{largest_entries, times_power};
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 /// Above this share of lambda max h, or of what rounding may hide, t* has left t_0.
 const VISIBLE: f64 = 1e-12;
+/// The same where t_0 is zero.
+const ALMOST_NONE: f64 = 1e-14;
 /// A scaled lambda above which no limit begins to bind: 1 is a force near the largest of one coil.
 const FAR: f64 = (1 << 20) as f64;
 /// More lines than lead to any constant.
@@ -75,6 +79,34 @@ pub(super) fn constants(
         floor: errors.proportional.map(|line| line.value),
         doubt: errors.doubt,
     })
+}
+
+/// A force constant, N/m, `share` of the largest at which there are currents without any error at the points,
+/// and such currents, A, as far as doubles have them; `None` where no lambda is the largest, or doubles do not
+/// lead to it. Without the drivers' size there are to be currents without error.
+pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, Vec<f64>)> {
+    let largest = largest_entries(problem);
+    let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
+    let mut limited = Doubles::new(&scaled, Form::Worst);
+    let mut lambda = Num::of(FAR);
+    for _ in 0..LINES {
+        fluxform_base::progress::poll();
+        let line = limited.at(lambda).ok()?.line();
+        // A tangent of a convex function leads from above to where it is zero, or stays above.
+        let step = line.value / line.slope;
+        if line.value <= Num::of(ALMOST_NONE) * scaled.top() * lambda
+            || step <= Num::of(VISIBLE) * lambda
+        {
+            lambda = lambda * Num::of(share);
+            let currents_a = scaled.currents_a(&limited.at(lambda).ok()?.piece.z);
+            return Some((
+                times_power(lambda.to_f64(), scaled.lambda_unit()),
+                currents_a,
+            ));
+        }
+        lambda -= step;
+    }
+    None
 }
 
 /// t* and t_0 at one lambda at a time.

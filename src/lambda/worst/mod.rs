@@ -36,6 +36,7 @@ mod program;
 mod proof;
 mod scaled;
 
+pub(super) use constants::without_error;
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
