@@ -109,7 +109,7 @@ pub(super) trait Basis {
 }
 
 /// The basis by a QR factorisation of its columns, which keeps its digits however nearly they
-/// depend on each other: a change costs the cube of their number.
+/// depend on each other; a change costs some squares of the rows.
 pub(super) struct QrBasis<'a> {
     model: &'a Model,
     target: Target,
@@ -143,11 +143,7 @@ impl Basis for QrBasis<'_> {
     }
 
     fn add(&mut self, before: &[usize], variable: usize) -> bool {
-        let Some(grown) = self.factor.with(self.model, before, variable) else {
-            return false;
-        };
-        self.factor = grown;
-        true
+        self.factor.add(self.model, before, variable)
     }
 
     fn members(&self) -> &[usize] {
@@ -159,7 +155,7 @@ impl Basis for QrBasis<'_> {
     }
 
     fn independence(&self) -> f64 {
-        self.factor.independence()
+        self.factor.independence(self.model)
     }
 
     fn resolution(&self) -> f64 {

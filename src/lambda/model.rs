@@ -86,24 +86,46 @@ impl Model {
     }
 }
 
-/// Householder factorisation of chosen columns with the equality eliminated: the pivot
-/// is the chosen variable of the smallest column per weight, so that the reduced columns
-/// `a_j - (w_j / w_p) a_p` never grow beyond twice the originals.
+/// `A = QR` of chosen columns with the equality eliminated: the pivot is the chosen variable of the
+/// smallest column per weight, so that the reduced columns `a_j - (w_j / w_p) a_p` never grow beyond
+/// twice the originals. Q is kept whole, so that a column comes by one reflection and goes by rotations:
+/// the square of the rows in operations, where all columns again would be the cube.
 #[derive(Debug, Clone)]
 pub(super) struct Factor {
     rows: usize,
     pivot: Option<usize>,
     /// Variables in the order of their columns, the pivot not among them.
     members: Vec<usize>,
-    /// Householder vectors, `rows` entries each.
-    reflectors: Vec<Num>,
-    scales: Vec<Num>,
-    /// Columns of the triangle, `rows` entries each.
+    /// The columns of Q, `rows` entries each.
+    turned: Vec<Num>,
+    /// The columns of R, `rows` entries each.
     triangle: Vec<Num>,
-    /// Smallest share of a member's column that lies outside the span of those before it.
-    independence: f64,
-    /// The same of every member and those before it.
-    independences: Vec<f64>,
+}
+
+/// `1 - v v' scale` on what follows the first rows.
+struct Reflection {
+    vector: Vec<Num>,
+    scale: Num,
+}
+
+impl Reflection {
+    /// The one that leaves the first entry alone, and that entry.
+    fn onto_first(mut vector: Vec<Num>) -> (Self, Num) {
+        let length = Num::dot(&vector, &vector).sqrt();
+        let first = if vector[0] > Num::ZERO {
+            -length
+        } else {
+            length
+        };
+        vector[0] -= first;
+        let scale = -(Num::ONE / (first * vector[0]));
+        (Self { vector, scale }, first)
+    }
+
+    fn apply(&self, to: &mut [Num]) {
+        let factor = -(self.scale * Num::dot(&self.vector, to));
+        Num::add_scaled(to, factor, &self.vector);
+    }
 }
 
 /// The minimiser over the members of a factor.
@@ -117,15 +139,18 @@ pub(super) struct Minimiser {
 impl Factor {
     /// Factorises the listed variables in order, leaving out those that depend on earlier ones.
     pub fn new(model: &Model, variables: &[usize]) -> Self {
+        let rows = model.rows;
+        let mut turned = vec![Num::ZERO; rows * rows];
+        turned
+            .iter_mut()
+            .step_by(rows + 1)
+            .for_each(|v| *v = Num::ONE);
         let mut factor = Self {
-            rows: model.rows,
+            rows,
             pivot: Self::pivot_of(model, variables),
             members: Vec::with_capacity(variables.len()),
-            reflectors: Vec::new(),
-            scales: Vec::new(),
+            turned,
             triangle: Vec::new(),
-            independence: 1.0,
-            independences: Vec::new(),
         };
         for &i in variables {
             factor.push(model, i);
@@ -133,40 +158,24 @@ impl Factor {
         factor
     }
 
-    /// Becomes the factor of `variables`: what this one has of them in the same order, up to the
-    /// first difference, is not factorised again.
+    /// Becomes the factor of `variables`: members that are not among them leave, the others are tried in
+    /// order.
     pub fn change_to(&mut self, model: &Model, variables: &[usize]) {
         if self.pivot != Self::pivot_of(model, variables) {
             *self = Self::new(model, variables);
             return;
         }
-        // Variables that this factor left out are tried again where they differ.
-        let mut members = self.members.iter().peekable();
-        let mut shared = 0;
-        for &i in variables {
-            if Some(i) == self.pivot {
-                continue;
+        let mut listed = vec![false; model.count()];
+        variables.iter().for_each(|&i| listed[i] = true);
+        for place in (0..self.members.len()).rev() {
+            if !listed[self.members[place]] {
+                self.remove(place);
             }
-            if members.next_if_eq(&&i).is_none() {
-                break;
-            }
-            shared += 1;
         }
-        self.truncate(shared);
-        let is_new = |i: &&usize| !self.members.contains(i);
-        for i in variables.iter().filter(is_new).copied().collect::<Vec<_>>() {
+        self.members.iter().for_each(|&i| listed[i] = false);
+        for &i in variables.iter().filter(|&&i| listed[i]) {
             self.push(model, i);
         }
-    }
-
-    /// Leaves the first `rank` members.
-    fn truncate(&mut self, rank: usize) {
-        self.members.truncate(rank);
-        self.scales.truncate(rank);
-        self.independences.truncate(rank);
-        self.reflectors.truncate(rank * self.rows);
-        self.triangle.truncate(rank * self.rows);
-        self.independence = self.independences.last().copied().unwrap_or(1.0);
     }
 
     /// The variable of the smallest column per weight, with an equality.
@@ -180,29 +189,29 @@ impl Factor {
         })
     }
 
-    /// Adds `variable` to a factor of `before`; `None` if it depends on them.
-    pub fn with(&self, model: &Model, before: &[usize], variable: usize) -> Option<Self> {
+    /// Adds `variable` to a factor of `before`; false if it depends on them.
+    pub fn add(&mut self, model: &Model, before: &[usize], variable: usize) -> bool {
         let changes_pivot = match (self.pivot, &model.weight) {
             (Some(p), Some(w)) => model.norm[variable] * w[p] < model.norm[p] * w[variable],
             (None, Some(_)) => true,
             _ => false,
         };
-        let grown = if changes_pivot {
-            let all: Vec<usize> = before.iter().copied().chain([variable]).collect();
-            Self::new(model, &all)
-        } else {
-            let mut grown = self.clone();
-            grown.push(model, variable);
-            grown
-        };
-        (grown.rank() > self.rank()).then_some(grown)
+        if !changes_pivot {
+            return self.push(model, variable).is_some();
+        }
+        let all: Vec<usize> = before.iter().copied().chain([variable]).collect();
+        let grown = Self::new(model, &all);
+        let grows = grown.rank() > self.rank();
+        if grows {
+            *self = grown;
+        }
+        grows
     }
 
     /// Takes the listed variables by the part of their columns that lies outside the span
-    /// of those taken, largest share first, as long as it is above `share`.
+    /// of those taken, largest share first, as long as it is above `share`. Without an equality.
     pub(crate) fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
-        let mut taken = Vec::new();
-        let mut factor = Self::new(model, &taken);
+        let mut factor = Self::new(model, &[]);
         // Every column times Q', of which all but the first rows lie outside the span.
         let mut turned: Vec<(usize, Vec<Num>)> = variables
             .iter()
@@ -210,9 +219,8 @@ impl Factor {
             .map(|&i| (i, model.column(i).to_vec()))
             .collect();
         // Each turn takes one more of them.
-        for _ in 0..variables.len() {
+        for rank in 0..variables.len() {
             fluxform_base::progress::poll();
-            let rank = factor.members.len();
             let outside = |(i, column): &(usize, Vec<Num>)| {
                 let rest = &column[rank..];
                 (Num::dot(rest, rest).sqrt() / model.norm[*i]).to_f64()
@@ -221,27 +229,16 @@ impl Factor {
                 .iter()
                 .map(|column| (column.0, outside(column)))
                 .reduce(|a, b| if b.1 > a.1 { b } else { a });
-            let grown = match best {
-                Some((i, part)) if part > share => {
-                    let grown = factor.with(model, &taken, i);
-                    taken.push(i);
-                    grown
-                }
+            let reflection = match best {
+                Some((i, part)) if part > share => factor.push(model, i),
                 _ => None,
             };
-            let Some(grown) = grown else {
+            let Some(reflection) = reflection else {
                 break;
             };
-            let same_pivot = grown.pivot == factor.pivot;
-            factor = grown;
             turned.retain(|(i, _)| !factor.contains(*i));
-            for (i, column) in &mut turned {
-                if same_pivot {
-                    factor.reflect_by(rank, column);
-                } else {
-                    column.copy_from_slice(model.column(*i));
-                    factor.reflect(column);
-                }
+            for (_, column) in &mut turned {
+                reflection.apply(&mut column[rank..]);
             }
         }
         factor
@@ -268,59 +265,81 @@ impl Factor {
     }
 
     /// Smallest share of a member's column that lies outside the span of those before it.
-    pub fn independence(&self) -> f64 {
-        self.independence
+    pub fn independence(&self, model: &Model) -> f64 {
+        let shares = self
+            .members
+            .iter()
+            .enumerate()
+            .map(|(k, &i)| (self.triangle[k * self.rows + k].abs() / model.norm[i]).to_f64());
+        shares.fold(1.0, f64::min)
     }
 
-    fn push(&mut self, model: &Model, variable: usize) {
+    /// Adds a column by the reflection that is returned; `None` where it depends on those before.
+    fn push(&mut self, model: &Model, variable: usize) -> Option<Reflection> {
         let (rows, rank) = (self.rows, self.members.len());
         if self.pivot == Some(variable) || rank == rows {
-            return;
+            return None;
         }
-        let mut column = model.column(variable).to_vec();
+        let mut column = model.filled(variable).to_vec();
         if let Some(p) = self.pivot {
+            column.resize(rows, Num::ZERO);
             Num::add_scaled(
                 &mut column,
                 -(model.weight_of(variable) / model.weight_of(p)),
                 model.column(p),
             );
         }
-        self.reflect(&mut column);
-        let outside = Num::dot(&column[rank..], &column[rank..]).sqrt();
-        let least = DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / self.independence);
+        let mut column = self.turn(&column);
+        let rest = column.split_off(rank);
+        let outside = Num::dot(&rest, &rest).sqrt();
+        let least = DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / self.independence(model));
         if outside <= model.norm[variable] * Num::of(least) {
-            return;
+            return None;
         }
-        self.independence = self
-            .independence
-            .min((outside / model.norm[variable]).to_f64());
-        let diagonal = if column[rank] > Num::ZERO {
-            -outside
-        } else {
-            outside
-        };
-        let mut reflector = column.clone();
-        reflector[..rank].fill(Num::ZERO);
-        reflector[rank] -= diagonal;
-        self.scales.push(-(Num::ONE / (diagonal * reflector[rank])));
-        self.reflectors.extend(reflector);
-        column[rank] = diagonal;
+        let (reflection, diagonal) = Reflection::onto_first(rest);
+        let behind = &mut self.turned[rank * rows..];
+        let mut along = vec![Num::ZERO; rows];
+        for (q, &v) in behind.chunks_exact(rows).zip(&reflection.vector) {
+            Num::add_scaled(&mut along, v, q);
+        }
+        for (q, &v) in behind.chunks_exact_mut(rows).zip(&reflection.vector) {
+            Num::add_scaled(q, -(reflection.scale * v), &along);
+        }
+        column.push(diagonal);
+        column.resize(rows, Num::ZERO);
         self.triangle.extend(column);
-        self.independences.push(self.independence);
         self.members.push(variable);
+        Some(reflection)
     }
 
-    fn reflect_by(&self, k: usize, vector: &mut [Num]) {
-        let reflector = &self.reflectors[k * self.rows + k..(k + 1) * self.rows];
-        let factor = -(self.scales[k] * Num::dot(reflector, &vector[k..]));
-        Num::add_scaled(&mut vector[k..], factor, reflector);
-    }
-
-    /// Multiplies by Q'.
-    fn reflect(&self, vector: &mut [Num]) {
-        for k in 0..self.members.len() {
-            self.reflect_by(k, vector);
+    /// Takes the member in this place out, and turns what its column leaves below the diagonal.
+    fn remove(&mut self, place: usize) {
+        let rows = self.rows;
+        self.members.remove(place);
+        self.triangle.drain(place * rows..(place + 1) * rows);
+        for k in place..self.members.len() {
+            let (a, b) = (self.triangle[k * rows + k], self.triangle[k * rows + k + 1]);
+            let length = (a * a + b * b).sqrt();
+            let (cos, sin) = (a / length, b / length);
+            for column in self.triangle[k * rows..].chunks_exact_mut(rows) {
+                let (a, b) = (column[k], column[k + 1]);
+                column[k] = cos * a + sin * b;
+                column[k + 1] = cos * b - sin * a;
+            }
+            self.triangle[k * rows + k + 1] = Num::ZERO;
+            let (low, high) = self.turned.split_at_mut((k + 1) * rows);
+            for (a, b) in low[k * rows..].iter_mut().zip(&mut high[..rows]) {
+                (*a, *b) = (cos * *a + sin * *b, cos * *b - sin * *a);
+            }
         }
+    }
+
+    /// Q' times a vector whose last entries may be left out where they are zero.
+    fn turn(&self, vector: &[Num]) -> Vec<Num> {
+        let columns = self.turned.chunks_exact(self.rows);
+        columns
+            .map(|q| Num::dot(&q[..vector.len()], vector))
+            .collect()
     }
 
     /// Minimises `|target - sum a_i x_i|` over the members with `sum w_i x_i = total`.
@@ -330,7 +349,7 @@ impl Factor {
         if let Some(p) = self.pivot {
             Num::add_scaled(&mut rest, -(total / model.weight_of(p)), model.column(p));
         }
-        self.reflect(&mut rest);
+        let mut rest = self.turn(&rest);
         let mut x = vec![Num::ZERO; model.count()];
         let mut left = total;
         for k in (0..rank).rev() {
@@ -344,25 +363,20 @@ impl Factor {
             x[p] = left / model.weight_of(p);
         }
         // The residual is what no member reaches, turned back: no cancellation.
-        rest[..rank].fill(Num::ZERO);
-        for k in (0..rank).rev() {
-            self.reflect_by(k, &mut rest);
+        let mut residual = vec![Num::ZERO; self.rows];
+        let behind = self.turned.chunks_exact(self.rows).zip(&rest);
+        for (q, &value) in behind.skip(rank) {
+            Num::add_scaled(&mut residual, value, q);
         }
-        Minimiser { x, residual: rest }
+        Minimiser { x, residual }
     }
 
     /// An orthonormal basis of the members' columns (reduced ones, with an equality).
     pub fn orthonormal(&self) -> Vec<Vec<Num>> {
-        let rank = self.members.len();
-        (0..rank)
-            .map(|k| {
-                let mut vector = vec![Num::ZERO; self.rows];
-                vector[k] = Num::ONE;
-                for l in (0..rank).rev() {
-                    self.reflect_by(l, &mut vector);
-                }
-                vector
-            })
+        let columns = self.turned.chunks_exact(self.rows);
+        columns
+            .take(self.members.len())
+            .map(<[Num]>::to_vec)
             .collect()
     }
 

@@ -1,5 +1,6 @@
 //! Arrays like the real one: ties, far and coincident coils, scaling laws, many points.
 
+use fluxform_lambda::worst::worst_point;
 use fluxform_lambda::{Event, Settings, Solution, Status, solve};
 
 use fluxform_testing::Random;
@@ -306,5 +307,31 @@ fn more_coils_than_points_render_more_than_fewer() {
             "{side}: {error_n:e}"
         );
         before = linear;
+    }
+}
+
+/// The program without the drivers' size went round in circles, and no constant was found.
+#[test]
+fn the_worst_point_of_closely_spaced_coils_is_found() {
+    let mut case = array_case(&square_array(15, 0.01), &flat_points(31, 0.03));
+    case.total = None;
+    let problem = case.problem();
+    let worst = worst_point(&problem, &Settings::default()).expect("well formed");
+    assert!(worst.complete);
+    let linear = worst.lambda_linear_n_per_m.expect("limits bind");
+    let floor = worst.floor.expect("no offset");
+    for (share, excess) in [(0.5, 0.0), (0.98, 0.0), (1.02, 1e-9)] {
+        let at = worst.at(&problem, share * linear);
+        let requested_n = share * linear * 0.03;
+        assert!(at.gap_n < 1e-10 * requested_n, "{share}: {:e}", at.gap_n);
+        let above = at.worst_error_n / requested_n - floor;
+        assert!(
+            if excess > 0.0 {
+                above > excess
+            } else {
+                above.abs() < 1e-11
+            },
+            "{share}: {above:e}"
+        );
     }
 }

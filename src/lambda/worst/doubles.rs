@@ -22,6 +22,8 @@ use fluxform_numerics::real::Real;
 
 /// Raise of the costs, relative to that of the minimised variable.
 const RAISE: f64 = 1e-7;
+/// Multipliers that differ by less are equal, in units of the raise.
+const TIE: f64 = 0.01;
 /// Rounding of a force summed in doubles, in units of the terms' sizes.
 const ROUNDINGS: f64 = 8.0;
 /// Multipliers up to this size below zero are zero.
@@ -30,6 +32,12 @@ const NONE: f64 = 1e-13;
 const PIVOT: f64 = 1e-9;
 /// Exchanges after which the inverse is recomputed.
 const FRESH: usize = 64;
+/// The same of position and multipliers.
+const AGAIN: usize = 16;
+/// Pivots above which position and multipliers keep their digits.
+const STEADY: f64 = 1e-3;
+/// Violated rows that are looked at again after an exchange.
+const LOOKED_AT: usize = 32;
 /// Points of which one joins at a time.
 const CHUNK: usize = 32;
 /// Points of one parallel task: fixed, so that results do not depend on the number of threads.
@@ -196,21 +204,30 @@ impl<'s, 'a> Doubles<'s, 'a> {
     /// Whether the vertex violates a known row, or misses a point outside the pool.
     fn misses(&mut self, lambda: f64) -> bool {
         let z = self.place(lambda);
-        self.most_violated(lambda, &z).is_some() || self.take_missed(lambda, &z)
+        !self.all_violated(lambda, &z).is_empty() || self.take_missed(lambda, &z)
     }
 
-    /// The known row that is violated most, where one is.
-    fn most_violated(&self, lambda: f64, z: &[f64]) -> Option<(usize, f64)> {
+    /// Those of the rows that are violated, the most violated ones first, with how much.
+    fn violated(
+        &self,
+        rows: impl Iterator<Item = usize>,
+        lambda: f64,
+        z: &[f64],
+    ) -> Vec<(usize, f64)> {
         let met = self.met(lambda, z);
-        let mut worst = None;
-        let mut most = met;
-        for row in (0..self.program.rows()).filter(|&row| !self.active[row]) {
-            let below = self.bound(row, lambda) - self.program.rough_times(row, z);
-            if below > most {
-                (worst, most) = (Some((row, below)), below);
-            }
-        }
-        worst
+        let below = |row: usize| self.bound(row, lambda) - self.program.rough_times(row, z);
+        let mut violated: Vec<(usize, f64)> = rows
+            .filter(|&row| !self.active[row])
+            .map(|row| (row, below(row)))
+            .filter(|&(_, below)| below > met)
+            .collect();
+        violated.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        violated
+    }
+
+    /// The same of all rows that are known.
+    fn all_violated(&self, lambda: f64, z: &[f64]) -> Vec<(usize, f64)> {
+        self.violated(0..self.program.rows(), lambda, z)
     }
 
     /// Runs the dual simplex method with raised costs until no point is missed.
@@ -225,20 +242,56 @@ impl<'s, 'a> Doubles<'s, 'a> {
         for (row, &value) in self.matrix.chunks_exact(n).zip(&multipliers) {
             add_scaled(&mut cost, value, row);
         }
+        let mut z = self.place(lambda);
+        let mut multipliers = self.shares(&cost);
+        // Few rows are looked at until none of them is violated any more.
+        let mut looked_at: Vec<usize> = Vec::new();
+        let mut moved = false;
         loop {
             fluxform_base::progress::poll();
-            let z = self.place(lambda);
-            let Some((row, _)) = self.most_violated(lambda, &z) else {
+            let mut violated = self.violated(looked_at.iter().copied(), lambda, &z);
+            if violated.is_empty() {
+                if moved {
+                    z = self.place(lambda);
+                    moved = false;
+                }
+                violated = self.all_violated(lambda, &z);
+                violated.truncate(LOOKED_AT);
+            }
+            looked_at = violated.iter().map(|&(row, _)| row).collect();
+            let Some(&(row, below)) = violated.first() else {
                 if self.add_missed(lambda, &z) {
                     continue;
                 }
                 return Ok(());
             };
+            // What rounding and ties leave below zero would lead back: more cost there.
+            for (k, value) in multipliers.iter_mut().enumerate() {
+                if *value < 0.0 {
+                    let more = TIE * raise * (0.5 + self.random.unit()) - *value;
+                    add_scaled(&mut cost, more, &self.matrix[k * n..(k + 1) * n]);
+                    *value += more;
+                }
+            }
             let coefficients = self.coefficients(row);
             let share = self.shares(&coefficients);
-            let multipliers = self.shares(&cost);
-            let leaving = leaving(&multipliers, &share, 0.01 * raise).ok_or(Failure::Infeasible)?;
+            let leaving = leaving(&multipliers, &share, TIE * raise).ok_or(Failure::Infeasible)?;
+            let pivot = share[leaving];
+            add_scaled(
+                &mut z,
+                below / pivot,
+                &self.inverse[leaving * n..(leaving + 1) * n],
+            );
+            moved = true;
+            let part = multipliers[leaving] / pivot;
+            add_scaled(&mut multipliers, -part, &share);
+            multipliers[leaving] = part;
             self.replace(leaving, row, &coefficients, &share)?;
+            if pivot < STEADY || self.exchanges.is_multiple_of(AGAIN) {
+                z = self.place(lambda);
+                multipliers = self.shares(&cost);
+                moved = false;
+            }
             if self.exchanges > limit {
                 return Err(Failure::Stalled);
             }
