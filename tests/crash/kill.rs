@@ -5,6 +5,8 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use crate::changes::{after_changes, changes};
 use crate::scenario::{Found, Prepared};
 use crate::table::Row;
@@ -155,13 +157,25 @@ impl Strike {
         every: usize,
         random: &mut Random,
     ) -> Result<Row, String> {
-        let mut row = Row::new(prepared.scenario.name, how.reported());
-        for at in (1 + random.below(every)..=self.calls(prepared, how)?).step_by(every) {
+        let first = 1 + random.below(every);
+        let calls: Vec<usize> = (first..=self.calls(prepared, how)?)
+            .step_by(every)
+            .collect();
+        let outcome = |at: usize| -> Result<(bool, Found), String> {
             let place = prepared.fresh();
             let (ran, _) = self.run(&place, how.mode(), at as i64, prepared.scenario.args);
             let found = self.judged(prepared, how, &place, &ran);
-            row.struck += usize::from(ran.code != Some(0));
-            row.add(found.map_err(|reported| format!("call {at}, {}: {reported}", how.mode()))?);
+            let found =
+                found.map_err(|reported| format!("call {at}, {}: {reported}", how.mode()))?;
+            Ok((ran.code != Some(0), found))
+        };
+        // Each in a folder of its own.
+        let outcomes: Vec<_> = calls.into_par_iter().map(outcome).collect();
+        let mut row = Row::new(prepared.scenario.name, how.reported());
+        for outcome in outcomes {
+            let (struck, found) = outcome?;
+            row.struck += usize::from(struck);
+            row.add(found);
         }
         Ok(row)
     }
