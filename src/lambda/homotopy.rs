@@ -40,7 +40,8 @@ pub(super) enum VariableState {
     High,
     /// Between the bounds, moving.
     Free,
-    /// Between the bounds, standing still because its column depends on those of free variables.
+    /// Between the bounds, its column dependent on those of others: standing still, or moving where the path
+    /// goes straight.
     Held,
 }
 
@@ -204,9 +205,8 @@ impl Follower<'_> {
         let rate = |(&to, &from): (&Num, &Num)| (to - from) / start.lambda;
         let x_rate: Vec<Num> = start.x.iter().zip(&state.x).map(rate).collect();
         let place = |i: usize| match state.place[i] {
-            VariableState::Low | VariableState::High if x_rate[i] != Num::ZERO => {
-                VariableState::Free
-            }
+            VariableState::Free => VariableState::Held,
+            _ if x_rate[i] != Num::ZERO => VariableState::Held,
             place => place,
         };
         Piece {

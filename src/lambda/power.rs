@@ -43,6 +43,12 @@ pub(super) fn least_power(
             VariableState::Low | VariableState::High => !sure(i),
         })
         .collect();
+    // Columns of free variables are independent; with a sum that binds, only as long as it is kept.
+    let free = |i: &usize| piece.place[*i] == VariableState::Free;
+    let sum_binds = model.weight.is_some() && !free(&coils);
+    if !sum_binds && open.iter().all(free) {
+        return x;
+    }
     let columns = open.iter().flat_map(|&i| model.column(i)).copied();
     let kept = Model::new(model.rows, columns.collect(), None, Num::EPSILON);
     let moves = dependences(&kept, &open, cost);
