@@ -96,6 +96,8 @@ pub(super) struct Factor {
     pivot: Option<usize>,
     /// Variables in the order of their columns, the pivot not among them.
     members: Vec<usize>,
+    /// Variables that were tried and depend on the members.
+    dependent: Vec<usize>,
     /// The columns of Q, `rows` entries each.
     turned: Vec<Num>,
     /// The columns of R, `rows` entries each.
@@ -149,12 +151,11 @@ impl Factor {
             rows,
             pivot: Self::pivot_of(model, variables),
             members: Vec::with_capacity(variables.len()),
+            dependent: Vec::new(),
             turned,
             triangle: Vec::new(),
         };
-        for &i in variables {
-            factor.push(model, i);
-        }
+        factor.try_each(model, variables, usize::MAX);
         factor
     }
 
@@ -167,14 +168,32 @@ impl Factor {
         }
         let mut listed = vec![false; model.count()];
         variables.iter().for_each(|&i| listed[i] = true);
+        let mut removed = 0;
         for place in (0..self.members.len()).rev() {
             if !listed[self.members[place]] {
                 self.remove(place);
+                removed += 1;
             }
         }
         self.members.iter().for_each(|&i| listed[i] = false);
-        for &i in variables.iter().filter(|&&i| listed[i]) {
-            self.push(model, i);
+        let others: Vec<usize> = variables.iter().copied().filter(|&i| listed[i]).collect();
+        self.try_each(model, &others, removed);
+    }
+
+    /// Adds what is independent. Those that depended before `removed` members went lie in the span that these
+    /// completed: as many of them as went complete it again, and no more are tried.
+    fn try_each(&mut self, model: &Model, variables: &[usize], removed: usize) {
+        let mut in_span = vec![false; model.count()];
+        self.dependent.drain(..).for_each(|i| in_span[i] = true);
+        let mut missing = removed;
+        for &i in variables {
+            fluxform_base::progress::poll();
+            let tried = !in_span[i] || missing > 0;
+            if tried && self.push(model, i).is_some() {
+                missing -= usize::from(in_span[i]);
+            } else if self.pivot != Some(i) {
+                self.dependent.push(i);
+            }
         }
     }
 

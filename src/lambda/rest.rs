@@ -51,6 +51,7 @@ pub(super) fn bring_to_rest(trace: &mut Trace, offset: Option<&[Num]>, slope: &[
 
 /// Whether the currents at the start of piece `k` cost nothing on all of piece `later`.
 fn is_free(pieces: &[Piece], k: usize, later: usize, slope: &[Num], requested: &[Num; 2]) -> bool {
+    fluxform_base::progress::poll();
     let (here, there) = (&pieces[k], &pieces[later]);
     let start = there.start;
     let mut still = here.residual.clone();
