@@ -62,20 +62,7 @@ pub(super) fn least_power(
     for vector in &moves {
         Num::add_scaled(&mut still, -Num::dot(vector, &p), vector);
     }
-    let mut constraints = Constraints {
-        rows: Vec::new(),
-        bounds: Vec::new(),
-    };
-    for (k, &i) in open.iter().enumerate() {
-        let row: Vec<Num> = moves.iter().map(|vector| vector[k]).collect();
-        if let Some(lower) = bounds.lower[i] {
-            constraints.at_least(&row, cost[i] * lower - still[k]);
-        }
-        if let Some(upper) = bounds.upper[i] {
-            let row: Vec<Num> = row.iter().map(|&v| -v).collect();
-            constraints.at_least(&row, still[k] - cost[i] * upper);
-        }
-    }
+    let mut constraints = Constraints::of(bounds, &open, &moves, cost, &still);
     // Where the sum's multiplier is not zero no change moves the sum: this says nothing then.
     if model.weight.is_some() {
         let share: Vec<Num> = open.iter().map(|&i| model.weight_of(i) / cost[i]).collect();
@@ -135,6 +122,31 @@ struct Constraints {
 }
 
 impl Constraints {
+    /// The limits of the open variables, `p = still + moves u` of their `cost x`.
+    fn of(
+        bounds: &Bounds,
+        open: &[usize],
+        moves: &[Vec<Num>],
+        cost: &[Num],
+        still: &[Num],
+    ) -> Self {
+        let mut constraints = Self {
+            rows: Vec::new(),
+            bounds: Vec::new(),
+        };
+        for (k, &i) in open.iter().enumerate() {
+            let row: Vec<Num> = moves.iter().map(|vector| vector[k]).collect();
+            if let Some(lower) = bounds.lower[i] {
+                constraints.at_least(&row, cost[i] * lower - still[k]);
+            }
+            if let Some(upper) = bounds.upper[i] {
+                let row: Vec<Num> = row.iter().map(|&v| -v).collect();
+                constraints.at_least(&row, still[k] - cost[i] * upper);
+            }
+        }
+        constraints
+    }
+
     fn at_least(&mut self, row: &[Num], bound: Num) {
         let length = Num::dot(row, row).sqrt();
         // A variable that no change reaches has nothing to say.
