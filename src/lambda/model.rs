@@ -89,7 +89,7 @@ impl Model {
 /// `A = QR` of chosen columns with the equality eliminated: the pivot is the chosen variable of the
 /// smallest column per weight, so that the reduced columns `a_j - (w_j / w_p) a_p` never grow beyond
 /// twice the originals. Q is kept whole, so that a column comes by one reflection and goes by rotations:
-/// the square of the rows in operations, where all columns again would be the cube.
+/// the square of the rows in operations; another pivot takes all columns again, the cube.
 #[derive(Debug, Clone)]
 pub(super) struct Factor {
     rows: usize,
@@ -99,7 +99,7 @@ pub(super) struct Factor {
     /// Variables that were tried and depend on the members.
     dependent: Vec<usize>,
     /// The columns of Q, `rows` entries each.
-    turned: Vec<Num>,
+    orthogonal: Vec<Num>,
     /// The columns of R, `rows` entries each.
     triangle: Vec<Num>,
 }
@@ -142,8 +142,8 @@ impl Factor {
     /// Factorises the listed variables in order, leaving out those that depend on earlier ones.
     pub fn new(model: &Model, variables: &[usize]) -> Self {
         let rows = model.rows;
-        let mut turned = vec![Num::ZERO; rows * rows];
-        turned
+        let mut orthogonal = vec![Num::ZERO; rows * rows];
+        orthogonal
             .iter_mut()
             .step_by(rows + 1)
             .for_each(|v| *v = Num::ONE);
@@ -152,7 +152,7 @@ impl Factor {
             pivot: Self::pivot_of(model, variables),
             members: Vec::with_capacity(variables.len()),
             dependent: Vec::new(),
-            turned,
+            orthogonal,
             triangle: Vec::new(),
         };
         factor.try_each(model, variables, usize::MAX);
@@ -316,7 +316,7 @@ impl Factor {
             return None;
         }
         let (reflection, diagonal) = Reflection::onto_first(rest);
-        let behind = &mut self.turned[rank * rows..];
+        let behind = &mut self.orthogonal[rank * rows..];
         let mut along = vec![Num::ZERO; rows];
         for (q, &v) in behind.chunks_exact(rows).zip(&reflection.vector) {
             Num::add_scaled(&mut along, v, q);
@@ -346,7 +346,7 @@ impl Factor {
                 column[k + 1] = cos * b - sin * a;
             }
             self.triangle[k * rows + k + 1] = Num::ZERO;
-            let (low, high) = self.turned.split_at_mut((k + 1) * rows);
+            let (low, high) = self.orthogonal.split_at_mut((k + 1) * rows);
             for (a, b) in low[k * rows..].iter_mut().zip(&mut high[..rows]) {
                 (*a, *b) = (cos * *a + sin * *b, cos * *b - sin * *a);
             }
@@ -355,7 +355,7 @@ impl Factor {
 
     /// Q' times a vector whose last entries may be left out where they are zero.
     fn turn(&self, vector: &[Num]) -> Vec<Num> {
-        let columns = self.turned.chunks_exact(self.rows);
+        let columns = self.orthogonal.chunks_exact(self.rows);
         columns
             .map(|q| Num::dot(&q[..vector.len()], vector))
             .collect()
@@ -383,7 +383,7 @@ impl Factor {
         }
         // The residual is what no member reaches, turned back: no cancellation.
         let mut residual = vec![Num::ZERO; self.rows];
-        let behind = self.turned.chunks_exact(self.rows).zip(&rest);
+        let behind = self.orthogonal.chunks_exact(self.rows).zip(&rest);
         for (q, &value) in behind.skip(rank) {
             Num::add_scaled(&mut residual, value, q);
         }
@@ -392,7 +392,7 @@ impl Factor {
 
     /// An orthonormal basis of the members' columns (reduced ones, with an equality).
     pub fn orthonormal(&self) -> Vec<Vec<Num>> {
-        let columns = self.turned.chunks_exact(self.rows);
+        let columns = self.orthogonal.chunks_exact(self.rows);
         columns
             .take(self.members.len())
             .map(<[Num]>::to_vec)

@@ -487,3 +487,39 @@ fn finish<T: Real>(
         path,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_whose_currents_have_another_error_is_not_solved() {
+        let problem = ForceProblem {
+            forces_n_per_a: &[0.13, 0.0, 0.05, 0.07, 0.0, 0.11],
+            height_m: &[0.05, 0.05, 0.05],
+            offset_n: None,
+            weights: None,
+            lower_a: &[0.0, 0.0],
+            upper_a: &[2.0, 1.3],
+            total_max_a: None,
+            resistance_ohm: &[6.0, 6.0],
+        };
+        let largest = largest_entries(&problem);
+        let (mut solved, rank, precision) = solve_paths(&problem, &largest);
+        for (share, status) in [(1.0, Status::Solved), (0.9, Status::Stalled)] {
+            for piece in &mut solved.limited.pieces {
+                let residuals = piece.residual.iter_mut().chain(&mut piece.residual_rate);
+                residuals.for_each(|residual| *residual = *residual * Num::of(share));
+            }
+            let path = Path::new(&problem, &solved.reduced, &solved.bounds, &solved.limited);
+            let settings = Settings {
+                at_n_per_m: Some(1.0),
+                ..Settings::default()
+            };
+            let finished = finish::<Num>(
+                &problem, &largest, &settings, &solved, path, rank, precision,
+            );
+            assert_eq!(finished.status, status, "{share}");
+        }
+    }
+}

@@ -320,18 +320,11 @@ fn the_worst_point_of_closely_spaced_coils_is_found() {
     assert!(worst.complete);
     let linear = worst.lambda_linear_n_per_m.expect("limits bind");
     let floor = worst.floor.expect("no offset");
-    for (share, excess) in [(0.5, 0.0), (0.98, 0.0), (1.02, 1e-9)] {
+    for (share, has_left) in [(0.5, false), (0.98, false), (1.02, true)] {
         let at = worst.at(&problem, share * linear);
         let requested_n = share * linear * 0.03;
         assert!(at.gap_n < 1e-10 * requested_n, "{share}: {:e}", at.gap_n);
         let above = at.worst_error_n / requested_n - floor;
-        assert!(
-            if excess > 0.0 {
-                above > excess
-            } else {
-                above.abs() < 1e-11
-            },
-            "{share}: {above:e}"
-        );
+        assert_eq!(above.abs() > 1e-11, has_left, "{share}: {above:e}");
     }
 }

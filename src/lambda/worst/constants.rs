@@ -82,8 +82,8 @@ pub(super) fn constants(
 }
 
 /// A force constant, N/m, `share` of the largest at which there are currents without any error at the points,
-/// and such currents, A, as far as doubles have them; `None` where no lambda is the largest, or doubles do not
-/// lead to it. Without the drivers' size there are to be currents without error.
+/// and such currents, A, as far as doubles have them; `None` where doubles do not lead to it. Without the
+/// drivers' size there are to be currents without error at every lambda.
 pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, Vec<f64>)> {
     let largest = largest_entries(problem);
     let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
