@@ -10,6 +10,7 @@ use fluxform_numerics::real::Real;
 
 use super::homotopy::{Bounds, ExactStart};
 use super::model::{Factor, Model};
+use super::pivoted::Pivoted;
 use super::problem::ForceProblem;
 use super::qr_reduction::{Reduced, times_power};
 use super::worst;
@@ -60,9 +61,9 @@ pub(super) fn exact_start(
         });
     }
     // Of a limit on the sum the slack takes what the coils leave.
-    let mut moving = Factor::pivoted(&reduced.unlimited(problem).0, &open, 0.0)
-        .members()
-        .to_vec();
+    let columns = open.iter().map(|&i| model.column(i).to_vec()).collect();
+    let independent = Pivoted::new(columns, open.len(), 0.0).members;
+    let mut moving: Vec<usize> = independent.into_iter().map(|k| open[k]).collect();
     if model.weight.is_some() {
         moving.push(x.len());
         x.push(Num::ZERO);

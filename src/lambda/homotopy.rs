@@ -291,16 +291,10 @@ impl Follower<'_> {
     fn leave(&self, state: &State, basis: &mut impl Basis) -> Option<(Piece, Option<Num>)> {
         let mut roles = self.roles(state, basis);
         let tie = Num::of(self.tie(basis)) * state.lambda;
+        let arrives = |i: usize| roles[i] != Role::Fixed && self.arrives(state, i, basis);
+        let mut likely: Vec<bool> = (0..roles.len()).map(arrives).collect();
         for _ in 0..=2 * self.model.count() {
             fluxform_base::progress::poll();
-            let likely: Vec<bool> = roles
-                .iter()
-                .zip(&state.place)
-                .map(|(role, place)| {
-                    *role != Role::Fixed
-                        && matches!(place, VariableState::Low | VariableState::High)
-                })
-                .collect();
             let direction = cone::solve(basis, &roles, &likely);
             if !direction.converged {
                 return None;
@@ -313,8 +307,22 @@ impl Follower<'_> {
                 return Some((piece, Some(step)));
             }
             roles[i] = role;
+            likely.fill(false);
+            basis.members().iter().for_each(|&i| likely[i] = true);
         }
         None
+    }
+
+    /// Whether a variable at a bound is expected to leave it: its multiplier goes to zero by more than rounding, or
+    /// nothing is known of it yet. Nearly dependent columns leave many multipliers within rounding of zero.
+    fn arrives(&self, state: &State, i: usize, basis: &impl Basis) -> bool {
+        let approach = match state.place[i] {
+            VariableState::Low => state.gradient_rate[i],
+            VariableState::High => -state.gradient_rate[i],
+            VariableState::Pinned | VariableState::Free | VariableState::Held => return false,
+        };
+        let rounding = Num::of(basis.noise()) * norm(&basis.target().slope);
+        state.lambda == Num::ZERO || approach > rounding * state.gradient_scale[i]
     }
 
     /// Relative distance in lambda below which two events are one: about the error of the columns or

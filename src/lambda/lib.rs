@@ -61,6 +61,7 @@ mod homotopy;
 pub mod limit;
 mod model;
 mod path;
+mod pivoted;
 mod power;
 mod problem;
 mod qr_reduction;

@@ -27,6 +27,12 @@ const DEPENDENT: f64 = 1e-25;
 /// The same in units of the rounding that nearly dependent columns amplify.
 const DEPENDENT_ROUNDINGS: f64 = 1e3;
 
+/// Share of a column outside the span of others, themselves independent by `independence`, up to which it
+/// depends on them.
+pub(super) fn least_share(independence: f64) -> f64 {
+    DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / independence)
+}
+
 impl Model {
     /// Columns stored one after another, `rows` entries each.
     pub fn new(rows: usize, columns: Vec<Num>, weight: Option<Vec<Num>>, epsilon: f64) -> Self {
@@ -105,14 +111,14 @@ pub(super) struct Factor {
 }
 
 /// `1 - v v' scale` on what follows the first rows.
-struct Reflection {
+pub(super) struct Reflection {
     vector: Vec<Num>,
     scale: Num,
 }
 
 impl Reflection {
     /// The one that leaves the first entry alone, and that entry.
-    fn onto_first(mut vector: Vec<Num>) -> (Self, Num) {
+    pub fn onto_first(mut vector: Vec<Num>) -> (Self, Num) {
         let length = Num::dot(&vector, &vector).sqrt();
         let first = if vector[0] > Num::ZERO {
             -length
@@ -124,9 +130,20 @@ impl Reflection {
         (Self { vector, scale }, first)
     }
 
-    fn apply(&self, to: &mut [Num]) {
+    pub fn apply(&self, to: &mut [Num]) {
         let factor = -(self.scale * Num::dot(&self.vector, to));
         Num::add_scaled(to, factor, &self.vector);
+    }
+
+    /// The same of every row of a matrix whose columns have `rows` entries.
+    fn turn_columns(&self, columns: &mut [Num], rows: usize) {
+        let mut along = vec![Num::ZERO; rows];
+        for (column, &v) in columns.chunks_exact(rows).zip(&self.vector) {
+            Num::add_scaled(&mut along, v, column);
+        }
+        for (column, &v) in columns.chunks_exact_mut(rows).zip(&self.vector) {
+            Num::add_scaled(column, -(self.scale * v), &along);
+        }
     }
 }
 
@@ -155,7 +172,7 @@ impl Factor {
             orthogonal,
             triangle: Vec::new(),
         };
-        factor.try_each(model, variables, usize::MAX);
+        factor.try_each(model, variables, 0);
         factor
     }
 
@@ -181,20 +198,46 @@ impl Factor {
     }
 
     /// Adds what is independent. Those that depended before `removed` members went lie in the span that these
-    /// completed: as many of them as went complete it again, and no more are tried.
+    /// completed: only what has a part along the directions that they left may complete it again.
     fn try_each(&mut self, model: &Model, variables: &[usize], removed: usize) {
+        let rows = self.rows;
         let mut in_span = vec![false; model.count()];
         self.dependent.drain(..).for_each(|i| in_span[i] = true);
-        let mut missing = removed;
+        let mut left = self.orthogonal[self.members.len() * rows..][..removed * rows].to_vec();
         for &i in variables {
             fluxform_base::progress::poll();
-            let tried = !in_span[i] || missing > 0;
-            if tried && self.push(model, i).is_some() {
-                missing -= usize::from(in_span[i]);
+            let along = in_span[i].then(|| self.part_along(model, i, &left));
+            if along.as_ref().is_none_or(Option::is_some) && self.push(model, i) {
+                // What others have along it is no longer outside.
+                if let Some((reflection, _)) = along.flatten().map(Reflection::onto_first) {
+                    reflection.turn_columns(&mut left, rows);
+                    left.drain(..rows);
+                }
             } else if self.pivot != Some(i) {
                 self.dependent.push(i);
             }
         }
+    }
+
+    /// The part of a variable's column along some directions; `None` where it is rounding.
+    fn part_along(&self, model: &Model, variable: usize, directions: &[Num]) -> Option<Vec<Num>> {
+        let column = self.reduced(model, variable);
+        let part: Vec<Num> = (directions.chunks_exact(self.rows))
+            .map(|direction| Num::dot(direction, &column))
+            .collect();
+        let least = model.norm[variable] * Num::of(least_share(self.independence(model)));
+        (Num::dot(&part, &part).sqrt() > least).then_some(part)
+    }
+
+    /// A variable's column with the equality eliminated, without zeros at its end.
+    fn reduced(&self, model: &Model, variable: usize) -> Vec<Num> {
+        let mut column = model.filled(variable).to_vec();
+        if let Some(p) = self.pivot {
+            column.resize(self.rows, Num::ZERO);
+            let share = model.weight_of(variable) / model.weight_of(p);
+            Num::add_scaled(&mut column, -share, model.column(p));
+        }
+        column
     }
 
     /// The variable of the smallest column per weight, with an equality.
@@ -216,7 +259,7 @@ impl Factor {
             _ => false,
         };
         if !changes_pivot {
-            return self.push(model, variable).is_some();
+            return self.push(model, variable);
         }
         let all: Vec<usize> = before.iter().copied().chain([variable]).collect();
         let grown = Self::new(model, &all);
@@ -225,42 +268,6 @@ impl Factor {
             *self = grown;
         }
         grows
-    }
-
-    /// Takes the listed variables by the part of their columns that lies outside the span
-    /// of those taken, largest share first, as long as it is above `share`. Without an equality.
-    pub(crate) fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
-        let mut factor = Self::new(model, &[]);
-        // Every column times Q', of which all but the first rows lie outside the span.
-        let mut turned: Vec<(usize, Vec<Num>)> = variables
-            .iter()
-            .filter(|&&i| model.norm[i] > Num::ZERO)
-            .map(|&i| (i, model.column(i).to_vec()))
-            .collect();
-        // Each turn takes one more of them.
-        for rank in 0..variables.len() {
-            fluxform_base::progress::poll();
-            let outside = |(i, column): &(usize, Vec<Num>)| {
-                let rest = &column[rank..];
-                (Num::dot(rest, rest).sqrt() / model.norm[*i]).to_f64()
-            };
-            let best = turned
-                .iter()
-                .map(|column| (column.0, outside(column)))
-                .reduce(|a, b| if b.1 > a.1 { b } else { a });
-            let reflection = match best {
-                Some((i, part)) if part > share => factor.push(model, i),
-                _ => None,
-            };
-            let Some(reflection) = reflection else {
-                break;
-            };
-            turned.retain(|(i, _)| !factor.contains(*i));
-            for (_, column) in &mut turned {
-                reflection.apply(&mut column[rank..]);
-            }
-        }
-        factor
     }
 
     /// Number of variables that may move: the members and the pivot.
@@ -293,42 +300,25 @@ impl Factor {
         shares.fold(1.0, f64::min)
     }
 
-    /// Adds a column by the reflection that is returned; `None` where it depends on those before.
-    fn push(&mut self, model: &Model, variable: usize) -> Option<Reflection> {
+    /// Adds a column by a reflection; false where it depends on those before.
+    fn push(&mut self, model: &Model, variable: usize) -> bool {
         let (rows, rank) = (self.rows, self.members.len());
         if self.pivot == Some(variable) || rank == rows {
-            return None;
+            return false;
         }
-        let mut column = model.filled(variable).to_vec();
-        if let Some(p) = self.pivot {
-            column.resize(rows, Num::ZERO);
-            Num::add_scaled(
-                &mut column,
-                -(model.weight_of(variable) / model.weight_of(p)),
-                model.column(p),
-            );
-        }
-        let mut column = self.turn(&column);
+        let mut column = self.turn(&self.reduced(model, variable));
         let rest = column.split_off(rank);
         let outside = Num::dot(&rest, &rest).sqrt();
-        let least = DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / self.independence(model));
-        if outside <= model.norm[variable] * Num::of(least) {
-            return None;
+        if outside <= model.norm[variable] * Num::of(least_share(self.independence(model))) {
+            return false;
         }
         let (reflection, diagonal) = Reflection::onto_first(rest);
-        let behind = &mut self.orthogonal[rank * rows..];
-        let mut along = vec![Num::ZERO; rows];
-        for (q, &v) in behind.chunks_exact(rows).zip(&reflection.vector) {
-            Num::add_scaled(&mut along, v, q);
-        }
-        for (q, &v) in behind.chunks_exact_mut(rows).zip(&reflection.vector) {
-            Num::add_scaled(q, -(reflection.scale * v), &along);
-        }
+        reflection.turn_columns(&mut self.orthogonal[rank * rows..], rows);
         column.push(diagonal);
         column.resize(rows, Num::ZERO);
         self.triangle.extend(column);
         self.members.push(variable);
-        Some(reflection)
+        true
     }
 
     /// Takes the member in this place out, and turns what its column leaves below the diagonal.
@@ -337,6 +327,7 @@ impl Factor {
         self.members.remove(place);
         self.triangle.drain(place * rows..(place + 1) * rows);
         for k in place..self.members.len() {
+            fluxform_base::progress::poll();
             let (a, b) = (self.triangle[k * rows + k], self.triangle[k * rows + k + 1]);
             let length = (a * a + b * b).sqrt();
             let (cos, sin) = (a / length, b / length);

@@ -12,6 +12,7 @@ use super::basis::{Basis, QrBasis, Target};
 use super::cone::{self, Role};
 use super::homotopy::{Bounds, Piece, VariableState};
 use super::model::{Factor, Model};
+use super::pivoted::Pivoted;
 
 /// A variable that the dependences move by less than this share is not moved by them.
 const UNREACHED: f64 = 1e-22;
@@ -49,9 +50,8 @@ pub(super) fn least_power(
     if !sum_binds && open.iter().all(free) {
         return x;
     }
-    let columns = open.iter().flat_map(|&i| model.column(i)).copied();
-    let kept = Model::new(model.rows, columns.collect(), None, Num::EPSILON);
-    let moves = dependences(&kept, &open, cost);
+    let kept = open.iter().map(|&i| model.column(i).to_vec()).collect();
+    let moves = dependences(kept, &open, cost);
     if moves.is_empty() {
         return x;
     }
@@ -95,17 +95,17 @@ fn clipped(bounds: &Bounds, i: usize, x: Num) -> Num {
 }
 
 /// An orthonormal basis, in `cost x`, of the changes that the kept columns do not see.
-fn dependences(kept: &Model, open: &[usize], cost: &[Num]) -> Vec<Vec<Num>> {
-    let all: Vec<usize> = (0..open.len()).collect();
-    let factor = Factor::pivoted(kept, &all, 0.0);
+fn dependences(kept: Vec<Vec<Num>>, open: &[usize], cost: &[Num]) -> Vec<Vec<Num>> {
+    let pivoted = Pivoted::new(kept, open.len(), 0.0);
     let mut columns = Vec::new();
     let mut count = 0;
-    for j in (0..open.len()).filter(|&j| !factor.contains(j)) {
-        let shares = factor.solve(kept, kept.column(j), Num::ZERO).x;
-        columns.extend((0..open.len()).map(|k| {
-            let change = if k == j { Num::ONE } else { -shares[k] };
-            cost[open[k]] * change
-        }));
+    for j in (0..open.len()).filter(|&j| !pivoted.contains(j)) {
+        let mut change = vec![Num::ZERO; open.len()];
+        change[j] = cost[open[j]];
+        for (&k, share) in pivoted.members.iter().zip(pivoted.shares(j)) {
+            change[k] = -(cost[open[k]] * share);
+        }
+        columns.extend(change);
         count += 1;
     }
     if count == 0 {

@@ -17,9 +17,9 @@ use fluxform_numerics::qr::triangular_factor;
 use fluxform_numerics::real::Real;
 
 use super::homotopy::Bounds;
-use super::model::{Factor, Model};
+use super::model::{Model, Reflection};
+use super::pivoted::Pivoted;
 use super::problem::ForceProblem;
-use super::tableau::MOST_CONDITION;
 
 /// A dependence among columns below this share of a column lies within the rounding of its entries.
 const HIDDEN_IN_ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -88,6 +88,29 @@ pub(super) struct Reduced {
     pub lambda_scale: i32,
     /// Relative error of an operation on the points.
     pub epsilon: f64,
+}
+
+/// A problem whose dependences are exact.
+pub(super) struct Clean {
+    pub reduced: Reduced,
+    /// Number of independent columns among the coils'.
+    pub rank: usize,
+    /// By how much every coil's column was moved, in the unit of the columns.
+    pub moved: Vec<Num>,
+}
+
+impl Clean {
+    /// Bound on what that changes in the fit of any currents within the limits, in units of force.
+    pub fn most_moved(&self, problem: &ForceProblem) -> Num {
+        let of_coil = |(i, &moved): (usize, &Num)| {
+            moved
+                * Num::of(times_power(
+                    problem.reach_a(i),
+                    self.reduced.current_scale(i),
+                ))
+        };
+        (self.moved.iter().enumerate().map(of_coil)).fold(Num::ZERO, |sum, of_coil| sum + of_coil)
+    }
 }
 
 fn copy<T>(to: &mut [T], from: impl Iterator<Item = T>) {
@@ -165,11 +188,8 @@ impl Reduced {
     }
 
     /// By the products of the columns, in double-double: quicker, for coils' columns of this condition
-    /// number. `None` where it is too large, or the heights nearly depend on them.
+    /// number. `None` where a column or the heights depend too nearly on others.
     pub fn by_products(problem: &ForceProblem, largest: &[f64], condition: f64) -> Option<Self> {
-        if condition > MOST_CONDITION {
-            return None;
-        }
         let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
         let unit = power_of_two(-exponent_of(problem.heaviest()));
         let triangle = triangular_factor_by_products(
@@ -213,7 +233,7 @@ impl Reduced {
             columns.push(column.into_iter().map(|v| v * factor).collect());
             scale.push(exponent_of(most) + more);
         }
-        let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
+        let reach = |i: usize| problem.reach_a(i);
         let force_scale = (0..coils)
             .filter(|&i| reach(i) > 0.0 && largest[i] > 0.0)
             .map(|i| exponent_of(reach(i)) + scale[i])
@@ -277,32 +297,55 @@ impl Reduced {
 
     /// Number of independent columns among the coils'.
     pub fn rank(&self) -> usize {
-        let model = self.model(None);
-        let coils: Vec<usize> = (0..self.coils).collect();
-        Factor::pivoted(&model, &coils, 0.0).rank()
+        let coils = self.columns[..self.coils].to_vec();
+        Pivoted::new(coils, self.coils, 0.0).members.len()
     }
 
-    /// The same problem with every dependence that only rounding hides made exact, or `None`
-    /// where there is none.
-    pub(crate) fn with_clean_dependences(&self) -> Option<Self> {
-        let model = self.model(None);
-        let coils: Vec<usize> = (0..self.coils).collect();
-        let factor = Factor::pivoted(&model, &coils, HIDDEN_IN_ROUNDING);
-        if factor.rank() == self.rank() {
+    /// The same problem with every dependence made exact, those too that only rounding hides, and turned so that it
+    /// has little more rows than independent columns; `None` where there is none.
+    pub(crate) fn with_clean_dependences(&self) -> Option<Clean> {
+        let pivoted = Pivoted::new(self.columns.clone(), self.coils, HIDDEN_IN_ROUNDING);
+        let rank = pivoted.members.len();
+        if rank == self.coils {
             return None;
         }
-        let mut clean = self.clone();
-        for j in (0..self.coils).filter(|&j| !factor.contains(j) && model.norm[j] > Num::ZERO) {
-            let shares = factor.solve(&model, model.column(j), Num::ZERO).x;
-            let mut column = vec![Num::ZERO; self.rows()];
-            for i in (0..self.coils).filter(|&i| factor.contains(i)) {
-                if (shares[i] * model.norm[i] / model.norm[j]).abs() > Num::of(HIDDEN_IN_ROUNDING) {
-                    Num::add_scaled(&mut column, shares[i], model.column(i));
+        let length = |column: &[Num]| Num::dot(column, column).sqrt();
+        let norm: Vec<Num> = self.columns.iter().map(|column| length(column)).collect();
+        let mut moved = vec![Num::ZERO; self.coils];
+        let mut columns = pivoted.turned.clone();
+        for j in (0..self.coils).filter(|&j| norm[j] > Num::ZERO && !pivoted.contains(j)) {
+            columns[j].fill(Num::ZERO);
+            for (&i, share) in pivoted.members.iter().zip(pivoted.shares(j)) {
+                if (share * norm[i] / norm[j]).abs() > Num::of(HIDDEN_IN_ROUNDING) {
+                    Num::add_scaled(&mut columns[j], share, &pivoted.turned[i]);
                 }
             }
-            clean.columns[j] = column;
+            let mut off = pivoted.turned[j].clone();
+            Num::add_scaled(&mut off, -Num::ONE, &columns[j]);
+            moved[j] = length(&off);
         }
-        Some(clean)
+        // The coils have nothing below their rank: one row there is enough for the heights, one more for the offset.
+        let rows = self.rows().min(rank + columns.len() - self.coils);
+        for (row, j) in (rank..rows).zip(self.coils..) {
+            let rest = columns[j].split_off(row);
+            if rest.iter().any(|&v| v != Num::ZERO) {
+                let (reflection, first) = Reflection::onto_first(rest);
+                columns[j].push(first);
+                (columns[j + 1..].iter_mut())
+                    .for_each(|column| reflection.apply(&mut column[row..]));
+            }
+        }
+        columns
+            .iter_mut()
+            .for_each(|column| column.resize(rows, Num::ZERO));
+        Some(Clean {
+            reduced: Self {
+                columns,
+                ..self.clone()
+            },
+            rank,
+            moved,
+        })
     }
 
     /// The target's direction per unit of lambda', in units of force.
@@ -427,11 +470,17 @@ mod tests {
                     epsilon: Num::EPSILON,
                 };
                 assert_eq!(reduced.rank(), 3);
-                let clean = reduced.with_clean_dependences().unwrap();
-                assert_eq!(clean.rank(), 2);
+                let Clean {
+                    reduced: clean,
+                    rank,
+                    ..
+                } = reduced.with_clean_dependences().unwrap();
+                assert_eq!((rank, clean.rank()), (2, 2));
+                assert_eq!(clean.rows(), 2);
                 let requested = if kept { share } else { 0.0 };
-                for (found, requested) in clean.columns[2].iter().zip([1.0, requested, 0.0]) {
-                    let off = (found.to_f64() / length - requested).abs();
+                for (column, requested) in clean.columns.iter().zip([1.0, requested]) {
+                    let found = Num::dot(column, &clean.columns[2]).to_f64();
+                    let off = (found / length.powi(2) - requested).abs();
                     assert!(off < 1e-25, "{length} {share}: {off}");
                 }
             }

@@ -25,6 +25,8 @@ const PLAIN_CONDITION: f64 = 1e3;
 const INDEPENDENT: f64 = 1e10;
 /// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
 const PLAIN_ERROR: f64 = 2e-14;
+/// Change of e*, relative to lambda^2 mean(h^2), up to which dependences are taken as exact.
+const SHOWN: f64 = 1e-11;
 /// Share of lambda^2 mean(h^2) by which the currents' error may be above e*, or the path is wrong.
 const AGREES: f64 = 1e-8;
 /// Largest relative violation of optimality that is taken for rounding: its square counts.
@@ -188,31 +190,19 @@ impl Solved {
         self.limited.complete && self.unlimited.complete && self.flaw <= FLAW
     }
 
-    /// e* at scaled lambda, relative to `lambda^2 mean(h^2)`.
-    fn relative_error(&self, lambda: Num) -> f64 {
-        let pieces = &self.limited.pieces;
-        let k = pieces
-            .partition_point(|piece| piece.start <= lambda)
-            .saturating_sub(1);
-        let residual = pieces[k].residual_at(lambda);
+    /// Bound on the change of e*, relative to `lambda^2 mean(h^2)`, where the fit of any currents within the limits
+    /// moves by no more than `moved`, in its unit.
+    fn change(&self, moved: Num) -> f64 {
         let heights = self.reduced.heights();
-        (Num::dot(&residual, &residual) / (lambda * lambda * Num::dot(heights, heights))).to_f64()
-    }
-
-    /// Whether both describe the same e*, as far as it is requested.
-    fn agrees_with(&self, other: &Self) -> bool {
-        let starts = self
-            .limited
-            .pieces
-            .iter()
-            .chain(&other.limited.pieces)
-            .map(|piece| piece.start);
-        starts
-            .filter(|&lambda| lambda > Num::ZERO)
-            .flat_map(|lambda| [lambda, lambda + lambda])
-            .all(|lambda| {
-                (self.relative_error(lambda) - other.relative_error(lambda)).abs() <= PLAIN_ERROR
-            })
+        let height = Num::dot(heights, heights).sqrt();
+        let change = |piece: &Piece| {
+            let error = Num::dot(&piece.residual, &piece.residual).sqrt();
+            let requested = piece.start * height;
+            ((error + error + moved) * moved / (requested * requested)).to_f64()
+        };
+        let pieces = self.limited.pieces.iter();
+        let changes = pieces.filter(|piece| piece.start > Num::ZERO).map(change);
+        changes.fold(0.0, f64::max)
     }
 }
 
@@ -333,11 +323,10 @@ pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, u
     let reduced = condition
         .and_then(|condition| Reduced::by_products(problem, largest, condition))
         .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
-    let solved = match condition {
-        Some(_) => Solved::new(problem, reduced, condition),
+    let (solved, rank) = match condition {
+        Some(_) => (Solved::new(problem, reduced, condition), coils),
         None => solve_dependent(problem, reduced),
     };
-    let rank = condition.map_or_else(|| solved.reduced.rank(), |_| coils);
     (solved, rank, Precision::DoubleDouble)
 }
 
@@ -352,17 +341,29 @@ fn solve_plainly(problem: &ForceProblem, reduced: Reduced, condition: f64) -> Op
 }
 
 /// Where columns may depend on each other: dependences that lie within the rounding of the forces are
-/// taken as exact, provided that this does not show in e*.
-fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> Solved {
-    let clean = reduced.with_clean_dependences();
-    let literal = Solved::new(problem, reduced, None);
-    if let Some(clean) = clean {
-        let clean = Solved::new(problem, clean, None);
-        if clean.reliable() && (clean.agrees_with(&literal) || !literal.reliable()) {
-            return clean;
+/// taken as exact, provided that this does not show in e*. With the number of independent columns.
+fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> (Solved, usize) {
+    let clean = reduced.with_clean_dependences().map(|clean| {
+        let moved = clean.most_moved(problem);
+        let mut solved = Solved::new(problem, clean.reduced, None);
+        let change = solved.change(moved);
+        solved.error += change;
+        (solved, clean.rank, change)
+    });
+    let clean = clean.filter(|(clean, _, _)| clean.reliable());
+    match clean {
+        Some((clean, rank, change)) if change <= SHOWN => (clean, rank),
+        clean => {
+            let literal = Solved::new(problem, reduced, None);
+            match clean.filter(|_| !literal.reliable()) {
+                Some((clean, rank, _)) => (clean, rank),
+                None => {
+                    let rank = literal.reduced.rank();
+                    (literal, rank)
+                }
+            }
         }
     }
-    literal
 }
 
 /// lambda_linear and lambda_jnd, N/m, off the two paths; null where no height is above zero.

@@ -1,18 +1,21 @@
 //! The triangular factor of a tall matrix, by Householder reflections over fixed row chunks.
 //!
-//! Each chunk of rows is stacked under the running factor and reduced; groups of
+//! Each chunk of rows is stacked under the running factor and reduced, many columns in parallel; groups of
 //! chunks run in parallel and are merged in order, so that the result does not
 //! depend on the number of threads. The backward error is that of a plain
 //! Householder QR, column by column; the matrix times its transpose is never formed.
 
 use std::ops::Range;
 
+use fluxform_base::progress;
 use rayon::prelude::*;
 
 use super::real::Real;
 
 /// Rows reduced at a time: ten columns of them stay in the first-level cache.
 const CHUNK_ROWS: usize = 256;
+/// Columns whose reflections the others take together, side by side.
+const PANEL_COLUMNS: usize = 32;
 /// Chunks of one parallel task.
 const GROUP_CHUNKS: usize = 64;
 /// Squares of what is left of a column up to which it is nothing. Where columns depend on others, as where
@@ -63,29 +66,65 @@ impl<T: Real> Triangle<T> {
     /// column by column, `stride` apart. The block is overwritten.
     fn absorb(&mut self, block: &mut [T], rows: usize, stride: usize) {
         let n = self.size;
-        for j in 0..n {
-            fluxform_base::progress::poll();
-            let (head, tail) = block.split_at_mut((j + 1) * stride);
-            let v = &head[j * stride..j * stride + rows];
-            let below = T::dot(v, v);
-            if below <= T::of(NOTHING) {
-                continue;
+        for start in (0..n).step_by(PANEL_COLUMNS) {
+            let width = PANEL_COLUMNS.min(n - start);
+            let (panel, others) = block[start * stride..].split_at_mut(width * stride);
+            let (above, others_above) = self.entries[start * n..].split_at_mut(width * n);
+            let above = above.chunks_exact_mut(n);
+            let mut reflections: Vec<Reflection<T>> = Vec::with_capacity(width);
+            for (row, (column, above)) in (start..).zip(panel.chunks_exact_mut(stride).zip(above)) {
+                progress::poll();
+                reflections.iter().for_each(|r| r.apply(above, column));
+                reflections.extend(Reflection::new(row, above, &column[..rows]));
             }
-            let alpha = self.entries[j * n + j];
-            let norm = (alpha * alpha + below).sqrt();
-            let beta = if alpha > T::ZERO { -norm } else { norm };
-            let top = alpha - beta;
-            // H = 1 - (top, v)(top, v)' * scale, with |(top, v)|^2 = -2 beta top.
-            let scale = -(T::ONE / (beta * top));
-            self.entries[j * n + j] = beta;
-            for k in j + 1..n {
-                let c = &mut tail[(k - j - 1) * stride..(k - j - 1) * stride + rows];
-                let r = &mut self.entries[k * n + j];
-                let factor = -(scale * (top * *r + T::dot(v, c)));
-                *r += factor * top;
-                T::add_scaled(c, factor, v);
+            if others.is_empty() {
+                break;
             }
+            let above = others_above.par_chunks_exact_mut(n);
+            (others.par_chunks_exact_mut(stride).zip(above)).for_each(|(column, above)| {
+                progress::poll();
+                reflections.iter().for_each(|r| r.apply(above, column));
+            });
         }
+    }
+}
+
+/// `1 - (top, below)(top, below)' scale` on one row of the factor and the rows of a block under it.
+struct Reflection<'a, T> {
+    row: usize,
+    top: T,
+    below: &'a [T],
+    scale: T,
+}
+
+impl<'a, T: Real> Reflection<'a, T> {
+    /// The one that leaves nothing of a column `below` this row, where there is anything; its entry of the factor
+    /// takes it up.
+    fn new(row: usize, above: &mut [T], below: &'a [T]) -> Option<Self> {
+        let square = T::dot(below, below);
+        if square <= T::of(NOTHING) {
+            return None;
+        }
+        let alpha = above[row];
+        let norm = (alpha * alpha + square).sqrt();
+        let beta = if alpha > T::ZERO { -norm } else { norm };
+        let top = alpha - beta;
+        above[row] = beta;
+        Some(Self {
+            row,
+            top,
+            below,
+            // |(top, below)|^2 = -2 beta top.
+            scale: -(T::ONE / (beta * top)),
+        })
+    }
+
+    /// Of another column.
+    fn apply(&self, above: &mut [T], column: &mut [T]) {
+        let entry = &mut above[self.row];
+        let factor = -(self.scale * (self.top * *entry + T::dot(self.below, column)));
+        *entry += factor * self.top;
+        T::add_scaled(column, factor, self.below);
     }
 }
 

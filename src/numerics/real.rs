@@ -100,8 +100,9 @@ impl Real for f64 {
 
     /// Eight running sums: the compiler may keep them in vector registers, and their order is fixed.
     fn dot(a: &[Self], b: &[Self]) -> Self {
-        let (a8, a_rest) = a.as_chunks::<8>();
-        let (b8, b_rest) = b.as_chunks::<8>();
+        let count = a.len().min(b.len());
+        let (a8, a_rest) = a[..count].as_chunks::<8>();
+        let (b8, b_rest) = b[..count].as_chunks::<8>();
         let mut lanes = [0.0; 8];
         for (x, y) in a8.iter().zip(b8) {
             for k in 0..8 {
@@ -172,6 +173,9 @@ mod tests {
             let b: Vec<f64> = (0..n).map(|i| f64::from(i * i % 11)).collect();
             let plain: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
             assert_eq!(f64::dot(&a, &b), plain);
+            // Sums end with the shorter one.
+            let longer: Vec<f64> = b.iter().copied().chain([1.0; 9]).collect();
+            assert_eq!(f64::dot(&a, &longer), plain);
         }
     }
 }

@@ -56,7 +56,7 @@ impl<'a> Scaled<'a> {
         limits: Limits,
     ) -> Self {
         let coils = problem.coils();
-        let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
+        let reach = |i: usize| problem.reach_a(i);
         let moves = |i: usize| limits == Limits::Lower || reach(i) > 0.0;
         // A coil without force may still carry a negative current and so make room in the sum.
         let summed = limits == Limits::All && problem.total_max_a.is_some();
@@ -106,8 +106,7 @@ impl<'a> Scaled<'a> {
         if self.largest[i] > 0.0 {
             return exponent_of(self.largest[i]);
         }
-        let reach = self.problem.upper_a[i].max(-self.problem.lower_a[i]);
-        self.force - exponent_of(reach)
+        self.force - exponent_of(self.problem.reach_a(i))
     }
 
     fn height(&self) -> i32 {
