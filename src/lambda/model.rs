@@ -2,6 +2,7 @@
 
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
+use rayon::prelude::*;
 
 /// Columns `a_i` of one least-squares problem and the weights of its equality
 /// `sum w_i x_i = total` (a limit on the sum enters as an equality with a slack
@@ -145,6 +146,23 @@ impl Reflection {
             Num::add_scaled(column, -(self.scale * v), &along);
         }
     }
+}
+
+/// Operations from which two threads are quicker than one.
+const WORTH_THREADS: usize = 1 << 16;
+
+/// A number of each of `count`, each of so many operations.
+fn of_each(
+    count: usize,
+    operations: usize,
+    number: impl Fn(usize) -> Num + Send + Sync,
+) -> Vec<Num> {
+    if count * operations < WORTH_THREADS {
+        return (0..count).map(number).collect();
+    }
+    let least = WORTH_THREADS / 4 / operations.max(1);
+    let numbers = (0..count).into_par_iter().with_min_len(least);
+    numbers.map(number).collect()
 }
 
 /// The minimiser over the members of a factor.
@@ -346,10 +364,9 @@ impl Factor {
 
     /// Q' times a vector whose last entries may be left out where they are zero.
     fn turn(&self, vector: &[Num]) -> Vec<Num> {
-        let columns = self.orthogonal.chunks_exact(self.rows);
-        columns
-            .map(|q| Num::dot(&q[..vector.len()], vector))
-            .collect()
+        let product =
+            |k: usize| Num::dot(&self.orthogonal[k * self.rows..][..vector.len()], vector);
+        of_each(self.rows, self.rows, product)
     }
 
     /// Minimises `|target - sum a_i x_i|` over the members with `sum w_i x_i = total`.
@@ -395,9 +412,9 @@ impl Factor {
         let nu = self.pivot.map_or(Num::ZERO, |p| {
             Num::dot(model.column(p), residual) / model.weight_of(p)
         });
-        let mut gradient: Vec<Num> = (0..model.count())
-            .map(|i| Num::dot(model.filled(i), residual) - nu * model.weight_of(i))
-            .collect();
+        let mut gradient = of_each(model.count(), self.rows, |i| {
+            Num::dot(model.filled(i), residual) - nu * model.weight_of(i)
+        });
         for &i in self.members.iter().chain(&self.pivot) {
             gradient[i] = Num::ZERO;
         }

@@ -13,6 +13,7 @@ use crate::field::steel::array_cost::ArrayCost;
 use crate::field::steel::passive::coupling_tolerance;
 pub use crate::map::Components;
 use crate::shape::document::{AxisRequest, ShapeDocument};
+use fluxform_base::uncertainty::Uncertainty;
 
 /// Bytes of a map's value: it is held twice, as it is computed and as it is written.
 const MAP_VALUE_BYTES: f64 = 16.0;
@@ -65,6 +66,28 @@ const WORST_POINT: Law = Law {
     stage: "the worst point's force constants",
     seconds: |points, coils| 8e-8 * points * coils + 4e-8 * coils.powi(3),
     reduce: FEWER,
+};
+/// Of coils so near to each other, as seen from the object, that their forces nearly depend on each other, and
+/// of the paths that tell the error of the number of points (`time fluxform lambda`, 225 and 900 coils).
+const PATHS_OF_CLOSE_COILS: Law = Law {
+    seconds: |points, coils| 7e-10 * points * coils.powi(2) + 1.3e-9 * coils.powi(4),
+    reduce: "fewer points or coils, or coils further apart, take less",
+    ..PATH
+};
+/// Heights of the target above the coils, in distances between them, from which they are so near: condition
+/// numbers grow by the exponential of four times that.
+const CLOSE: f64 = 2.5;
+/// A path for every coil and for every pair (`time fluxform lambda --variants`).
+const VARIANTS: Law = Law {
+    stage: "the variants of wiring",
+    seconds: |points, coils| 1.5 * coils * (PATH.seconds)(points, coils),
+    reduce: "fewer points or coils, or no --variants, take less",
+};
+/// `time fluxform lambda --sensor-error 1mm --tilt 5deg`, 49 and 225 coils.
+const UNCERTAINTIES: Law = Law {
+    stage: "the uncertainties",
+    seconds: |points, coils| 3.3e-7 * points * coils.powi(2),
+    reduce: "fewer points or coils, or no [uncertainty], take less",
 };
 /// Of one component in air, by `--law map-table:nodes --law map-table:coils`.
 const MAP: Law = Law {
@@ -203,7 +226,6 @@ pub fn of_force_constants(
     shape: &ShapeDocument,
     tolerance: Option<f64>,
 ) -> Vec<Cost> {
-    let points = product(&[shape.grid.x.samples(), shape.grid.y.samples()]);
     let positions_m = &design.array.positions_m;
     let forces = if coupled(design) || design.has_iron() {
         FORCES_OF_STEEL
@@ -212,9 +234,35 @@ pub fn of_force_constants(
     } else {
         FORCES
     };
-    [forces, PATH, WORST_POINT]
-        .map(|law| law.cost(points, positions_m.len() as f64))
+    let path = if design.target_height_m > CLOSE * closest_m(positions_m) {
+        PATHS_OF_CLOSE_COILS
+    } else {
+        PATH
+    };
+    [forces, path, WORST_POINT]
+        .map(|law| at_points(&law, design, shape))
         .into()
+}
+
+/// The time that force constants of every change of the wiring take, if they are `requested`.
+#[must_use]
+pub fn of_variants(design: &Design, shape: &ShapeDocument, requested: bool) -> Option<Cost> {
+    requested.then(|| at_points(&VARIANTS, design, shape))
+}
+
+/// The time that currents for what is `uncertain` take.
+#[must_use]
+pub fn of_uncertainties(
+    design: &Design,
+    shape: &ShapeDocument,
+    uncertain: &Uncertainty,
+) -> Option<Cost> {
+    (!uncertain.is_none()).then(|| at_points(&UNCERTAINTIES, design, shape))
+}
+
+fn at_points(law: &Law, design: &Design, shape: &ShapeDocument) -> Cost {
+    let points = product(&[shape.grid.x.samples(), shape.grid.y.samples()]);
+    law.cost(points, design.array.positions_m.len() as f64)
 }
 
 /// What is computed of every design of a sweep.

@@ -403,6 +403,29 @@ fn a_command_of_minutes_says_so_before_it_begins() {
     let announced =
         "this will take about 4 min, most of it the forces of 225 coils at 361201 points";
     assert!(said.contains(announced), "{said}");
+    // From above, coils at a third of the height nearly depend on each other.
+    let small = [
+        ("24.0", "3.0"),
+        ("38.0", "9.6"),
+        ("0.7", "0.3"),
+        ("50.0", "10.0"),
+    ];
+    let close = small.iter().fold(array(30, "", 100.0), |text, (from, to)| {
+        text.replace(from, to)
+    });
+    place.write("close.toml", &close);
+    for (args, announced) in [
+        (&["close.toml"][..], "lambda's path of 900 coils"),
+        (
+            &["air.toml", "--variants"],
+            "the variants of wiring of 225 coils",
+        ),
+    ] {
+        let args = [&["lambda"], args, &["shapes/flat.toml", "--threads", "1"]].concat();
+        let said = said_of(&place, &args, 1500);
+        let announced = format!("min, most of it {announced}");
+        assert!(said.contains(&announced), "{said}");
+    }
     let plan = [
         "sweep",
         "plan",

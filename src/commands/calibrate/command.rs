@@ -28,7 +28,7 @@ use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
 use crate::design::Need;
 use crate::scene::cached_field::SteelPart;
-use crate::scene::cost::{Components, of_map, of_steel};
+use crate::scene::cost::{Components, of_map, of_steel, of_uncertainties};
 use crate::scene::shard::Shard;
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::ErrorTarget;
@@ -174,9 +174,13 @@ impl Calibrate {
         } else {
             Components::Gz
         };
+        let uncertain = options.lambda.uncertainty.over(design.uncertainty);
+        let uncertainties = (shapes.iter())
+            .filter_map(|shape| of_uncertainties(design, &shape.document, &uncertain));
         allow(
             costs(design, &shapes, self.tolerance.tolerance)
                 .into_iter()
+                .chain(uncertainties)
                 .chain([of_map(design, components)]),
             cost_origin(&shapes),
             printer,

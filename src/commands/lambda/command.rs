@@ -23,6 +23,7 @@ use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
 use crate::lambda::{Criterion, Jnd, Settings, Wiring};
+use crate::scene::cost::{of_uncertainties, of_variants};
 use crate::scene::tolerances::ErrorTarget;
 use crate::units::FORCE_JND;
 
@@ -207,8 +208,16 @@ impl Lambda {
         if let Some(plot) = &plot {
             plot.check(from_ref(&document.input))?;
         }
+        let uncertain = options.uncertainty.over(design.uncertainty);
+        let requested = shapes.iter().flat_map(|shape| {
+            let variants = of_variants(design, &shape.document, options.variants);
+            let uncertainties = of_uncertainties(design, &shape.document, &uncertain);
+            variants.into_iter().chain(uncertainties)
+        });
         allow(
-            costs(design, &shapes, self.tolerance.tolerance),
+            costs(design, &shapes, self.tolerance.tolerance)
+                .into_iter()
+                .chain(requested),
             cost_origin(&shapes),
             printer,
         )?;

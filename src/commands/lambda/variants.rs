@@ -1,5 +1,7 @@
 //! The effect of an offset, currents of both signs, pairs in series and broken coils on lambda.
 
+use rayon::prelude::*;
+
 use std::slice::from_ref;
 
 use super::PosedProblem;
@@ -85,20 +87,30 @@ pub(super) fn all(
         relative_change: base.filter(|&l| l > 0.0).map(|_| 0.0),
         ..first
     }];
-    for change in supply_and_series(posed, passive_n.is_some(), &as_given) {
-        variants.push(solve(&change, base)?);
-    }
+    let mut changes = supply_and_series(posed, passive_n.is_some(), &as_given);
     let broken = |coils: &[usize], name: String| {
         let mut change = as_given.renamed(name);
         change.wiring.broken.extend_from_slice(coils);
         change
     };
-    let mut hurt: Vec<(f64, usize)> = Vec::new();
-    for coil in (0..unwired.coils()).filter(|&coil| !is_wired(wiring, coil)) {
-        let variant = solve(&broken(&[coil], format!("{coil} broken")), base)?;
-        hurt.push((variant.lambda_n_per_m.unwrap_or(0.0), coil));
-        variants.push(variant);
-    }
+    let whole = (0..unwired.coils()).filter(|&coil| !is_wired(wiring, coil));
+    let whole: Vec<usize> = whole.collect();
+    changes.extend(
+        whole
+            .iter()
+            .map(|&coil| broken(&[coil], format!("{coil} broken"))),
+    );
+    // As many as coils and pairs of them: each runs on a thread of its own.
+    let solved: Result<Vec<_>, RunError> = changes
+        .par_iter()
+        .map(|change| solve(change, base))
+        .collect();
+    variants.extend(solved?);
+    let of_broken = &variants[variants.len() - whole.len()..];
+    let hurt = of_broken.iter().zip(&whole);
+    let mut hurt: Vec<(f64, usize)> = hurt
+        .map(|(variant, &coil)| (variant.lambda_n_per_m.unwrap_or(0.0), coil))
+        .collect();
     // The order of equally bad ones is that of the coils.
     hurt.sort_by(|a, b| a.0.total_cmp(&b.0));
     if let [(_, a), (_, b), _, ..] = hurt[..] {
