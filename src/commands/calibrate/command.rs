@@ -13,7 +13,7 @@ use super::{run, run_shard};
 use crate::cli::args::{
     ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag, Writing,
 };
-use crate::cli::budget::{CostOrigin, allow, cost_origin, costs};
+use crate::cli::budget::{CostOrigin, allow, cost_origin};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -25,10 +25,10 @@ use crate::cli::start::begin;
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
-use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
+use crate::commands::lambda::command::{CriterionFlags, costs_of, rendered, well_placed};
 use crate::design::Need;
 use crate::scene::cached_field::SteelPart;
-use crate::scene::cost::{Components, of_map, of_steel, of_uncertainties};
+use crate::scene::cost::{Components, of_map, of_steel};
 use crate::scene::shard::Shard;
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::ErrorTarget;
@@ -174,13 +174,9 @@ impl Calibrate {
         } else {
             Components::Gz
         };
-        let uncertain = options.lambda.uncertainty.over(design.uncertainty);
-        let uncertainties = (shapes.iter())
-            .filter_map(|shape| of_uncertainties(design, &shape.document, &uncertain));
         allow(
-            costs(design, &shapes, self.tolerance.tolerance)
+            costs_of(design, &shapes, &options.lambda)
                 .into_iter()
-                .chain(uncertainties)
                 .chain([of_map(design, components)]),
             cost_origin(&shapes),
             printer,

@@ -21,9 +21,10 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
-use crate::design::Need;
+use crate::design::{Design, Need};
 use crate::lambda::{Criterion, Jnd, Settings, Wiring};
-use crate::scene::cost::{of_uncertainties, of_variants};
+use crate::scene::cost::{Cost, of_uncertainties, of_variants};
+use crate::scene::sources::ShapeSource;
 use crate::scene::tolerances::ErrorTarget;
 use crate::units::FORCE_JND;
 
@@ -208,16 +209,8 @@ impl Lambda {
         if let Some(plot) = &plot {
             plot.check(from_ref(&document.input))?;
         }
-        let uncertain = options.uncertainty.over(design.uncertainty);
-        let requested = shapes.iter().flat_map(|shape| {
-            let variants = of_variants(design, &shape.document, options.variants);
-            let uncertainties = of_uncertainties(design, &shape.document, &uncertain);
-            variants.into_iter().chain(uncertainties)
-        });
         allow(
-            costs(design, &shapes, self.tolerance.tolerance)
-                .into_iter()
-                .chain(requested),
+            costs_of(design, &shapes, &options),
             cost_origin(&shapes),
             printer,
         )?;
@@ -245,6 +238,21 @@ impl Lambda {
         }
         Ok(())
     }
+}
+
+/// The costs of a run with these options.
+#[must_use]
+pub fn costs_of(design: &Design, shapes: &[ShapeSource], options: &LambdaOptions) -> Vec<Cost> {
+    let uncertain = options.uncertainty.over(design.uncertainty);
+    let requested = shapes.iter().flat_map(|shape| {
+        let variants = of_variants(design, &shape.document, options.variants);
+        let uncertainties = of_uncertainties(design, &shape.document, &uncertain);
+        variants.into_iter().chain(uncertainties)
+    });
+    costs(design, shapes, options.tolerance)
+        .into_iter()
+        .chain(requested)
+        .collect()
 }
 
 /// Fails where the array cannot render the object where it is.
