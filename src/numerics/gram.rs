@@ -273,7 +273,7 @@ mod tests {
                     // Their diagonals may differ in sign.
                     let (a, b) = (reflected.column(j)[i], by_products.column(j)[i]);
                     let off = ((a.abs() - b.abs()).abs() / length).to_f64();
-                    let most = 1e-28 / (own * own);
+                    let most = 1e-28 * (0.7_f64 / own).powi(2);
                     assert!(off < most, "{own} of {rows} x {columns}, {i} {j}: {off:e}");
                 }
             }
