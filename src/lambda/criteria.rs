@@ -8,8 +8,8 @@ use fluxform_numerics::real::Real;
 use super::homotopy::{Bounds, Piece, Trace};
 use super::model::Model;
 
-/// Above this share of `lambda^2 mean(h^2)` e* has left e_0 where currents are not unique.
-const VISIBLE: f64 = 1e-24;
+/// Above this share of `lambda^2 mean(h^2)` e* has left e_0 where both are exact and currents are not unique.
+pub(super) const VISIBLE: f64 = 1e-24;
 
 /// e* and the error e_0 without the drivers' size, both as functions of lambda.
 pub(super) struct Comparison<'a> {
@@ -19,6 +19,8 @@ pub(super) struct Comparison<'a> {
     pub unlimited: &'a Trace,
     /// Mean of h^2, scaled.
     pub mean_square: Num,
+    /// Share of `lambda^2 mean(h^2)` above which e* has left e_0.
+    pub visible: f64,
 }
 
 /// A stretch on which neither of two paths turns: its ends, and the piece of each path.
@@ -157,7 +159,7 @@ impl<'a> Comparison<'a> {
 
     /// The same from the errors alone: the start of the first stretch on which e* leaves e_0.
     pub(crate) fn linear_by_error(&self) -> Option<Num> {
-        let visible = Num::of(VISIBLE) * self.mean_square;
+        let visible = Num::of(self.visible) * self.mean_square;
         self.stretches().iter().find_map(|stretch| {
             let length = match stretch.end {
                 Some(end) => end - stretch.start,
@@ -230,7 +232,7 @@ fn upward_crossing(a: Num, b: Num, c: Num) -> Option<Num> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Comparison, Num, Real};
+    use super::{Comparison, Num, Real, VISIBLE};
     use crate::homotopy::{Bounds, Follower};
     use crate::model::Model;
 
@@ -259,8 +261,8 @@ mod tests {
         let follower = Follower {
             model: &coils,
             bounds: &free,
-            condition: None,
             start: None,
+            most_error: None,
         };
         let mut path = follower.path(None, &numbers(&[0.0, 1.0]));
         // Half a thousand amperes a unit, and as much the other way.
@@ -282,6 +284,7 @@ mod tests {
             limited: &path,
             unlimited: &path,
             mean_square: Num::ONE,
+            visible: VISIBLE,
         };
         let linear = comparison.linear(&model, &bounds, &free).unwrap().to_f64();
         assert!((linear - 1.3).abs() < 1e-12, "{linear}");

@@ -29,7 +29,7 @@ use super::certificate::best_within_limits;
 use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::qr_reduction::{largest_entries, times_power};
-use super::solve::solve_paths;
+use super::solve::{Extent, solve_paths};
 
 /// The currents that decide lambda_jnd.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +57,7 @@ pub fn jnd_currents(
     problem.validate(&settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    let (solved, _, _) = solve_paths(problem, &largest);
+    let (solved, _, _) = solve_paths(problem, &largest, Extent::of(&settings));
     let Some(scaled) = solved.comparison().jnd(jnd_weight) else {
         return Ok(None);
     };
@@ -66,7 +66,13 @@ pub fn jnd_currents(
     if !solved.reliable() || problem.offset_n.is_some() || lambda_n_per_m <= 0.0 {
         return Ok(None);
     }
-    let path = Path::new(problem, reduced, &solved.bounds, &solved.limited);
+    let path = Path::new(
+        problem,
+        reduced,
+        &solved.bounds,
+        &solved.limited,
+        solved.doubt,
+    );
     // Without offset e_0 has one piece.
     let rates = &solved.unlimited.pieces[0].x_rate;
     let unlimited = rates.iter().take(problem.coils()).enumerate();

@@ -8,8 +8,9 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
+use super::basis::{Basis, Target};
 use super::homotopy::{Bounds, ExactStart};
-use super::model::{Factor, Model};
+use super::model::Model;
 use super::pivoted::Pivoted;
 use super::problem::ForceProblem;
 use super::qr_reduction::{Reduced, times_power};
@@ -68,22 +69,19 @@ pub(super) fn exact_start(
         moving.push(x.len());
         x.push(Num::ZERO);
     }
-    let factor = Factor::new(model, &moving);
-    let target: Vec<Num> = heights.iter().map(|&h| lambda * h).collect();
-    let fixed = (0..x.len())
-        .filter(|&i| !factor.contains(i))
-        .map(|i| (i, x[i]));
-    let (rest, left) = model.remainder(&target, bounds.total, fixed);
-    let exact = factor.solve(model, &rest, left);
-    for &i in factor.members().iter().chain(&factor.pivot()) {
-        x[i] = exact.x[i];
-    }
+    let mut basis = Basis::new(model, Target::along(heights));
+    basis.set(&moving);
+    let moves: Vec<usize> = basis.moving().collect();
+    let still = (0..x.len()).filter(|i| !moves.contains(i));
+    let fixed: Vec<(usize, Num)> = still.map(|i| (i, x[i])).collect();
+    let exact = basis.values(lambda, bounds.total, &fixed);
+    let (x, residual) = (exact.x, exact.residual);
     let within = |i: usize| {
         bounds.lower[i].is_none_or(|lower| x[i] >= lower)
             && bounds.upper[i].is_none_or(|upper| x[i] <= upper)
     };
-    (is_nothing(&exact.residual, &target) && (0..x.len()).all(within))
-        .then_some(ExactStart { lambda, x })
+    let target: Vec<Num> = heights.iter().map(|&h| lambda * h).collect();
+    (is_nothing(&residual, &target) && (0..x.len()).all(within)).then_some(ExactStart { lambda, x })
 }
 
 fn is_nothing(residual: &[Num], requested: &[Num]) -> bool {
@@ -95,7 +93,7 @@ fn is_nothing(residual: &[Num], requested: &[Num]) -> bool {
 mod tests {
     use super::*;
     use crate::qr_reduction::largest_entries;
-    use crate::solve::solve_paths;
+    use crate::solve::{Extent, solve_paths};
 
     /// Dipoles 10 mm apart under 3 x 3 points: from limit to limit the path up to lambda_linear has hundreds of pieces.
     #[test]
@@ -124,7 +122,8 @@ mod tests {
                 total_max_a,
                 resistance_ohm: &all(6.1),
             };
-            let (solved, rank, _) = solve_paths(&problem, &largest_entries(&problem));
+            let (solved, rank, _) =
+                solve_paths(&problem, &largest_entries(&problem), Extent::Whole);
             assert_eq!(rank, 9);
             assert!(solved.reliable());
             let exact = (solved.limited.pieces.iter())

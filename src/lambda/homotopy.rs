@@ -9,16 +9,12 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::basis::{Basis, QrBasis, Target};
+use super::basis::{Basis, Target};
 use super::cone::{self, Role};
 use super::model::Model;
-use super::tableau::{self, Products, Tableau};
 
 /// Relative distance from a bound or a zero multiplier that counts as none.
 const GRAIN: f64 = 1e-27;
-/// Largest flaw of a path by pivots: with more they have lost digits, and the path is followed by
-/// factorisations.
-const DRIFT: f64 = 1e-16;
 
 /// Bounds of the variables; `None`: unbounded on that side.
 #[derive(Debug, Clone)]
@@ -75,8 +71,19 @@ pub(super) struct Trace {
     /// Largest relative violation of the optimality conditions at the pieces' starts, and of
     /// the residual's continuity: its square is the error that it leaves in e*.
     pub flaw: f64,
-    /// Pivots made, where the basis was a tableau.
-    pub pivots: Option<usize>,
+    /// Columns that came into the basis or went.
+    pub changes: usize,
+}
+
+impl Trace {
+    fn of(pieces: Vec<Piece>, complete: bool) -> Self {
+        Self {
+            pieces,
+            complete,
+            flaw: 0.0,
+            changes: 0,
+        }
+    }
 }
 
 /// Values at one lambda, with the rates by which they were reached.
@@ -126,36 +133,17 @@ pub(super) struct ExactStart {
 pub(super) struct Follower<'a> {
     pub model: &'a Model,
     pub bounds: &'a Bounds,
-    /// Condition number of the columns where it is known.
-    pub condition: Option<f64>,
     /// Where the path goes straight, without an offset.
     pub start: Option<ExactStart>,
+    /// Square of the residual over `lambda^2`, beyond which the path is not needed: it comes to rest at the next
+    /// breakpoint. Without an offset this share never falls.
+    pub most_error: Option<Num>,
 }
 
 impl Follower<'_> {
     /// The path from the zero target at `lambda = 0`, where `x = 0` (the slack takes what
     /// the equality leaves), along `offset` first and then along `slope`.
     pub fn path(&self, offset: Option<&[Num]>, slope: &[Num]) -> Trace {
-        let condition = self.condition.filter(|&c| c <= tableau::MOST_CONDITION);
-        if let Some(condition) = condition {
-            let products = Products::new(self.model);
-            let basis = |target| Tableau::new(self.model, target, &products, condition);
-            let (mut trace, last) = self.path_on(basis, offset, slope);
-            trace.pivots = Some(last.pivots);
-            if trace.complete && trace.flaw <= DRIFT {
-                return trace;
-            }
-        }
-        let basis = |target| QrBasis::new(self.model, target);
-        self.path_on(basis, offset, slope).0
-    }
-
-    fn path_on<B: Basis>(
-        &self,
-        basis: impl Fn(Target) -> B,
-        offset: Option<&[Num]>,
-        slope: &[Num],
-    ) -> (Trace, B) {
         let count = self.model.count();
         let mut x = vec![Num::ZERO; count];
         if self.model.weight.is_some() {
@@ -173,7 +161,8 @@ impl Follower<'_> {
         let mut target = Target::along(slope);
         let mut arrived = true;
         if let Some(offset) = offset {
-            let approach = self.follow(state, &mut basis(Target::along(offset)), Some(Num::ONE));
+            let mut basis = Basis::new(self.model, Target::along(offset));
+            let approach = self.follow(state, &mut basis, Some(Num::ONE));
             arrived = approach.complete;
             let last = &approach.pieces[approach.pieces.len() - 1];
             state = State {
@@ -187,7 +176,7 @@ impl Follower<'_> {
             };
             target.constant = offset.to_vec();
         }
-        let mut basis = basis(target);
+        let mut basis = Basis::new(self.model, target);
         let straight = self.start.as_ref().map(|start| {
             let piece = self.straight(&state, start, &basis);
             state = self.reached(&piece, start);
@@ -197,11 +186,12 @@ impl Follower<'_> {
         trace.pieces.splice(0..0, straight);
         trace.complete &= arrived;
         trace.flaw = self.flaw(&trace.pieces, offset, slope);
-        (trace, basis)
+        trace.changes = basis.changes;
+        trace
     }
 
     /// The piece from `state`, where nothing flows, to `start`.
-    fn straight(&self, state: &State, start: &ExactStart, basis: &impl Basis) -> Piece {
+    fn straight(&self, state: &State, start: &ExactStart, basis: &Basis) -> Piece {
         let rate = |(&to, &from): (&Num, &Num)| (to - from) / start.lambda;
         let x_rate: Vec<Num> = start.x.iter().zip(&state.x).map(rate).collect();
         let place = |i: usize| match state.place[i] {
@@ -242,7 +232,7 @@ impl Follower<'_> {
         }
     }
 
-    fn follow(&self, mut state: State, basis: &mut impl Basis, end: Option<Num>) -> Trace {
+    fn follow(&self, mut state: State, basis: &mut Basis, end: Option<Num>) -> Trace {
         let mut pieces: Vec<Piece> = Vec::new();
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
@@ -264,33 +254,33 @@ impl Follower<'_> {
                         gradient_rate: piece.gradient_rate.clone(),
                         gradient_scale: piece.gradient_scale.clone(),
                     };
+                    if self.is_far(piece, lambda) {
+                        pieces.push(self.standstill(&state, basis.target()));
+                        return Trace::of(pieces, true);
+                    }
                 }
-                _ => {
-                    return Trace {
-                        pieces,
-                        complete: true,
-                        flaw: 0.0,
-                        pivots: None,
-                    };
-                }
+                _ => return Trace::of(pieces, true),
             }
         }
         if pieces.is_empty() {
             pieces.push(self.standstill(&state, basis.target()));
         }
-        Trace {
-            pieces,
-            complete: false,
-            flaw: 0.0,
-            pivots: None,
-        }
+        Trace::of(pieces, false)
+    }
+
+    /// Whether the path is not needed beyond `lambda`, the end of `piece`.
+    fn is_far(&self, piece: &Piece, lambda: Num) -> bool {
+        self.most_error.is_some_and(|most| {
+            let residual = piece.residual_at(lambda);
+            Num::dot(&residual, &residual) > most * lambda * lambda
+        })
     }
 
     /// The piece that begins at `state` and the step to its end, `None` for no end. An event
     /// that would end it at once makes its constraint one more that may change here.
-    fn leave(&self, state: &State, basis: &mut impl Basis) -> Option<(Piece, Option<Num>)> {
+    fn leave(&self, state: &State, basis: &mut Basis) -> Option<(Piece, Option<Num>)> {
         let mut roles = self.roles(state, basis);
-        let tie = Num::of(self.tie(basis)) * state.lambda;
+        let tie = Num::of(self.tie()) * state.lambda;
         let arrives = |i: usize| roles[i] != Role::Fixed && self.arrives(state, i, basis);
         let mut likely: Vec<bool> = (0..roles.len()).map(arrives).collect();
         for _ in 0..=2 * self.model.count() {
@@ -315,7 +305,7 @@ impl Follower<'_> {
 
     /// Whether a variable at a bound is expected to leave it: its multiplier goes to zero by more than rounding, or
     /// nothing is known of it yet. Nearly dependent columns leave many multipliers within rounding of zero.
-    fn arrives(&self, state: &State, i: usize, basis: &impl Basis) -> bool {
+    fn arrives(&self, state: &State, i: usize, basis: &Basis) -> bool {
         let approach = match state.place[i] {
             VariableState::Low => state.gradient_rate[i],
             VariableState::High => -state.gradient_rate[i],
@@ -325,19 +315,18 @@ impl Follower<'_> {
         state.lambda == Num::ZERO || approach > rounding * state.gradient_scale[i]
     }
 
-    /// Relative distance in lambda below which two events are one: about the error of the columns or
-    /// of the arithmetic.
-    fn tie(&self, basis: &impl Basis) -> f64 {
-        (100.0 * self.model.epsilon).max(basis.resolution())
+    /// Relative distance in lambda below which two events are one: about the error of the columns.
+    fn tie(&self) -> f64 {
+        100.0 * self.model.epsilon
     }
 
     /// Which variables may move where: those at a bound whose multiplier is zero, or will
     /// be at once, become one-sided, and so do those that meet a bound.
-    fn roles(&self, state: &State, basis: &impl Basis) -> Vec<Role> {
+    fn roles(&self, state: &State, basis: &Basis) -> Vec<Role> {
         let target = basis.target();
         let size = norm(&target.constant) + state.lambda.abs() * norm(&target.slope);
-        let grain = Num::of(basis.resolution().max(GRAIN));
-        let soon = Num::of(self.tie(basis)) * state.lambda;
+        let grain = Num::of(GRAIN);
+        let soon = Num::of(self.tie()) * state.lambda;
         let slack = self.model.weight.as_ref().map(|_| self.model.count() - 1);
         (0..self.model.count())
             .map(|i| match state.place[i] {
@@ -384,12 +373,10 @@ impl Follower<'_> {
         state: &State,
         roles: &[Role],
         direction: &cone::Direction,
-        basis: &impl Basis,
+        basis: &Basis,
     ) -> Piece {
         let mut moves = vec![false; roles.len()];
-        for &i in basis.members().iter().chain(&basis.pivot()) {
-            moves[i] = true;
-        }
+        basis.moving().for_each(|i| moves[i] = true);
         let place: Vec<VariableState> = (0..roles.len())
             .map(|i| match roles[i] {
                 Role::Fixed => state.place[i],
@@ -412,11 +399,7 @@ impl Follower<'_> {
             fixed.push((i, still(i)));
         }
         let residual_rate = basis.residual_rate(&x_rate);
-        let rates = (&x_rate[..], &residual_rate[..]);
-        let mut values = basis.values(state.lambda, self.bounds.total, &fixed, rates);
-        for &(i, x) in &fixed {
-            values.x[i] = x;
-        }
+        let values = basis.values(state.lambda, self.bounds.total, &fixed);
         let slope = norm(&basis.target().slope);
         let share = if slope > Num::ZERO {
             (norm(&residual_rate) / slope).to_f64()
@@ -445,7 +428,7 @@ impl Follower<'_> {
         piece: &Piece,
         roles: &[Role],
         direction: &cone::Direction,
-        basis: &impl Basis,
+        basis: &Basis,
     ) -> Option<(usize, Num, Role)> {
         let slope = norm(&basis.target().slope);
         let mut first: Option<(usize, Num, Role)> = None;
@@ -535,9 +518,7 @@ impl Follower<'_> {
     /// A piece that stays where `state` is.
     fn standstill(&self, state: &State, target: &Target) -> Piece {
         let values = state.x.iter().copied().enumerate();
-        let (rest, _) = self
-            .model
-            .remainder(&target.constant, self.bounds.total, values);
+        let rest = self.model.remainder(&target.constant, values);
         Piece {
             start: state.lambda,
             place: state.place.clone(),
@@ -557,6 +538,180 @@ impl Follower<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fluxform_numerics::random::Random;
+
+    /// Columns, bounds and targets of one problem.
+    struct Case {
+        model: Model,
+        bounds: Bounds,
+        offset: Option<Vec<Num>>,
+        slope: Vec<Num>,
+    }
+
+    /// `side` by `side` coils under points on a grid of twice as many; the columns of mirrored coils are
+    /// mirrored to the last bit, so that up to eight events fall together.
+    fn array(side: usize, slopes: &[f64]) -> Case {
+        let samples = 2 * side;
+        let at = |k: usize, of: usize| (2 * k) as f64 - (of - 1) as f64;
+        let mut columns = Vec::new();
+        for coil in 0..side * side {
+            for point in 0..samples * samples {
+                let along =
+                    |coil: usize, point: usize| (at(coil, side) - 0.5 * at(point, samples)).powi(2);
+                let apart =
+                    along(coil % side, point % samples) + along(coil / side, point / samples);
+                columns.push(Num::of((1.0 - 0.2 * apart) * (-0.4 * apart).exp()));
+            }
+        }
+        let slope = (0..samples * samples).map(|point| {
+            let far = at(point % samples, samples).abs() + at(point / samples, samples).abs();
+            Num::of(slopes.get(point).copied().unwrap_or(1.0 + 0.03 * far))
+        });
+        let coils = side * side;
+        Case {
+            slope: slope.collect(),
+            model: Model::new(samples * samples, columns, None, Num::EPSILON),
+            bounds: Bounds {
+                lower: vec![Some(Num::ZERO); coils],
+                upper: vec![Some(Num::of(0.7)); coils],
+                total: Num::ZERO,
+            },
+            offset: None,
+        }
+    }
+
+    impl Case {
+        /// The same with a limit on the sum.
+        fn summed(mut self, total: f64) -> Self {
+            let mut columns: Vec<Num> = (0..self.model.count())
+                .flat_map(|i| self.model.column(i).to_vec())
+                .collect();
+            columns.extend(vec![Num::ZERO; self.model.rows]);
+            let weight = vec![Num::ONE; self.model.count() + 1];
+            self.model = Model::new(self.model.rows, columns, Some(weight), Num::EPSILON);
+            self.bounds.lower.push(Some(Num::ZERO));
+            self.bounds.upper.push(None);
+            self.bounds.total = Num::of(total);
+            self
+        }
+
+        fn path(&self) -> Trace {
+            let follower = Follower {
+                model: &self.model,
+                bounds: &self.bounds,
+                start: None,
+                most_error: None,
+            };
+            follower.path(self.offset.as_deref(), &self.slope)
+        }
+
+        /// No variable that may grow gains more, for its weight, than any that may shrink would lose.
+        fn assert_least(&self, piece: &Piece, lambda: Num, what: &str) {
+            let x = piece.x_at(lambda);
+            let mut target = vec![Num::ZERO; self.model.rows];
+            let constant = self.offset.as_ref().unwrap_or(&target).clone();
+            Num::add_scaled(&mut target, Num::ONE, &constant);
+            Num::add_scaled(&mut target, lambda, &self.slope);
+            let size = norm(&target) + Num::ONE;
+            let (model, grain) = (&self.model, Num::of(1e-22) * size);
+            let residual = model.remainder(&target, x.iter().copied().enumerate());
+            for (a, b) in residual.iter().zip(piece.residual_at(lambda)) {
+                assert!((*a - b).abs() < grain, "{what}");
+            }
+            let total = (0..x.len()).fold(Num::ZERO, |sum, i| sum + model.weight_of(i) * x[i]);
+            let summed = model.weight.is_some();
+            assert!(!summed || (total - self.bounds.total).abs() < grain);
+            // Without an equality nothing has to be given for what is gained.
+            let (mut gain, mut loss) = match summed {
+                true => (None, None),
+                false => (Some(Num::ZERO), Some(Num::ZERO)),
+            };
+            for (i, &x) in x.iter().enumerate() {
+                let room = |to: Option<Num>| to.is_none_or(|to| (x - to).abs() > grain);
+                let (lower, upper) = (self.bounds.lower[i], self.bounds.upper[i]);
+                assert!(lower.is_none_or(|lower| x > lower - grain), "{what}");
+                assert!(upper.is_none_or(|upper| x < upper + grain), "{what}");
+                let weight = if summed { model.weight_of(i) } else { Num::ONE };
+                let slope = Num::dot(model.column(i), &residual) / weight;
+                if room(upper) {
+                    gain = Some(gain.map_or(slope, |gain: Num| gain.larger(slope)));
+                }
+                if room(lower) {
+                    loss = Some(loss.map_or(slope, |loss: Num| loss.smaller(slope)));
+                }
+            }
+            if let (Some(gain), Some(loss)) = (gain, loss) {
+                let off = ((gain - loss) / size).to_f64();
+                assert!(off < 1e-20, "{what}: {off:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_piece_is_the_minimiser_from_end_to_end() {
+        let mut random = Random::new(7);
+        for round in 0..24 {
+            let side = 2 + round % 3;
+            let coils = side * side;
+            let uneven: Vec<f64> = (0..4 * coils).map(|_| random.between(0.2, 1.8)).collect();
+            let mut case = array(side, if round % 4 == 0 { &[] } else { &uneven });
+            if round % 2 == 0 {
+                // Some reverse, some are unlimited, one is off.
+                for i in 0..coils {
+                    case.bounds.lower[i] = [Some(Num::of(-0.4)), Some(Num::ZERO), None][i % 3];
+                }
+                case.bounds.lower[1] = Some(Num::ZERO);
+                case.bounds.upper[1] = Some(Num::ZERO);
+            } else {
+                // The largest sum is the sum of the largest, or less.
+                let share = [1.0, 0.4, 0.05][round % 3];
+                case = case.summed(0.7 * share * coils as f64);
+            }
+            if round % 5 == 0 {
+                let offset = (0..4 * coils).map(|_| Num::of(random.between(-0.3, 0.3)));
+                case.offset = Some(offset.collect());
+            }
+            let trace = case.path();
+            assert!(trace.complete && trace.flaw < 1e-24, "round {round}");
+            for (k, piece) in trace.pieces.iter().enumerate() {
+                let end = match trace.pieces.get(k + 1) {
+                    Some(next) => next.start,
+                    None => Num::of(2.0) * piece.start + Num::ONE,
+                };
+                let middle = Num::of(0.5) * (piece.start + end);
+                for lambda in [piece.start, middle, end] {
+                    case.assert_least(piece, lambda, &format!("round {round} at {lambda:?}"));
+                }
+            }
+        }
+    }
+
+    /// A breakpoint costs a few changes, each of which is about the square of the number of coils in
+    /// operations, however many coils there are and however many events fall together.
+    #[test]
+    fn a_breakpoint_costs_a_few_changes() {
+        for side in [4, 8, 12] {
+            let coils = side * side;
+            let mut random = Random::new(side as u64);
+            let uneven: Vec<f64> = (0..4 * coils).map(|_| random.between(0.2, 1.8)).collect();
+            for slopes in [&[][..], &uneven] {
+                for case in [
+                    array(side, slopes),
+                    array(side, slopes).summed(0.5 * coils as f64),
+                ] {
+                    let trace = case.path();
+                    let (pieces, changes) = (trace.pieces.len(), trace.changes);
+                    assert!(trace.complete);
+                    let most = match case.model.weight {
+                        // Another pivot of the sum takes all again.
+                        Some(_) => pieces * coils,
+                        None => 2 * (coils + pieces),
+                    };
+                    assert!(changes <= most, "{coils}: {pieces}, {changes}");
+                }
+            }
+        }
+    }
 
     /// Turns come sooner for a larger target; nothing else is different, rounding included.
     #[test]
@@ -573,13 +728,15 @@ mod tests {
             upper: numbers(&[1.7, 0.9]).into_iter().map(Some).collect(),
             total: Num::ZERO,
         };
-        let follower = Follower {
-            model: &model,
-            bounds: &bounds,
-            condition: None,
-            start: None,
+        let path = |size: f64| {
+            Case {
+                model: model.clone(),
+                bounds: bounds.clone(),
+                offset: None,
+                slope: numbers(&[0.7 * size, 1.9 * size, 1.6 * size]),
+            }
+            .path()
         };
-        let path = |size: f64| follower.path(None, &numbers(&[0.7 * size, 1.9 * size, 1.6 * size]));
         let one = path(1.0);
         assert!(one.complete && one.pieces.len() > 1);
         for size in [2.0f64.powi(-30), 2.0f64.powi(30)] {

@@ -68,7 +68,6 @@ mod qr_reduction;
 mod rest;
 pub mod sideways;
 mod solve;
-mod tableau;
 pub mod two_fingers;
 pub mod uncertainty;
 mod vector_allocation;

@@ -109,17 +109,20 @@ pub struct Path {
     ambiguous: Option<Box<Ambiguous>>,
     limits: Limits,
     current_scale: Vec<i32>,
+    /// Mean square error over lambda^2 up to which there may be none, m^2; 0 where it is exact.
+    doubt_m2: f64,
     /// First pieces after each breakpoint.
     turns: Vec<usize>,
 }
 
 impl Path {
-    /// Converts a scaled path.
+    /// Converts a scaled path whose errors are known to the share `doubt` of the requested force's mean square.
     pub(super) fn new(
         problem: &ForceProblem,
         reduced: &Reduced,
         bounds: &Bounds,
         trace: &Trace,
+        doubt: f64,
     ) -> Self {
         let coils = problem.coils();
         let force = reduced.force_unit_n();
@@ -167,6 +170,7 @@ impl Path {
                 total_max_a: problem.total_max_a,
             },
             current_scale,
+            doubt_m2: doubt * problem.rms_height_m().powi(2),
             turns: Vec::new(),
         };
         path.turns = path.turns();
@@ -306,7 +310,7 @@ impl Path {
     }
 
     /// Pieces at which something visible changes: ties within rounding count once, and where
-    /// currents are ambiguous only a change of the fit counts.
+    /// currents are ambiguous only a change of the fit counts. None count where there may be no error.
     fn turns(&self) -> Vec<usize> {
         let mut turns: Vec<usize> = Vec::new();
         for (k, piece) in self.pieces.iter().enumerate() {
@@ -316,14 +320,20 @@ impl Path {
             {
                 turns.pop();
             }
-            if turns
-                .last()
-                .is_none_or(|&last| self.differ(&self.pieces[last], piece))
-            {
+            if turns.last().is_none_or(|&last| {
+                self.differ(&self.pieces[last], piece) && !self.is_doubtful(piece)
+            }) {
                 turns.push(k);
             }
         }
         turns
+    }
+
+    fn is_doubtful(&self, piece: &SiPiece) -> bool {
+        let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
+        self.doubt_m2 > 0.0
+            && square(&piece.residual_rate) <= self.doubt_m2
+            && square(&piece.residual) <= self.doubt_m2 * piece.start.powi(2)
     }
 
     fn differ(&self, before: &SiPiece, after: &SiPiece) -> bool {

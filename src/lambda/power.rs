@@ -8,10 +8,10 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::basis::{Basis, QrBasis, Target};
+use super::basis::{Basis, Target};
 use super::cone::{self, Role};
 use super::homotopy::{Bounds, Piece, VariableState};
-use super::model::{Factor, Model};
+use super::model::Model;
 use super::pivoted::Pivoted;
 
 /// A variable that the dependences move by less than this share is not moved by them.
@@ -97,22 +97,22 @@ fn clipped(bounds: &Bounds, i: usize, x: Num) -> Num {
 /// An orthonormal basis, in `cost x`, of the changes that the kept columns do not see.
 fn dependences(kept: Vec<Vec<Num>>, open: &[usize], cost: &[Num]) -> Vec<Vec<Num>> {
     let pivoted = Pivoted::new(kept, open.len(), 0.0);
-    let mut columns = Vec::new();
-    let mut count = 0;
+    let mut moves: Vec<Vec<Num>> = Vec::new();
     for j in (0..open.len()).filter(|&j| !pivoted.contains(j)) {
         let mut change = vec![Num::ZERO; open.len()];
         change[j] = cost[open[j]];
         for (&k, share) in pivoted.members.iter().zip(pivoted.shares(j)) {
             change[k] = -(cost[open[k]] * share);
         }
-        columns.extend(change);
-        count += 1;
+        // What the first pass leaves of others' directions the second takes.
+        for vector in moves.iter().chain(&moves) {
+            let along = Num::dot(vector, &change);
+            Num::add_scaled(&mut change, -along, vector);
+        }
+        let length = Num::dot(&change, &change).sqrt();
+        moves.push(change.iter().map(|&v| v / length).collect());
     }
-    if count == 0 {
-        return Vec::new();
-    }
-    let moves = Model::new(open.len(), columns, None, Num::EPSILON);
-    Factor::new(&moves, &(0..count).collect::<Vec<_>>()).orthonormal()
+    moves
 }
 
 /// Linear inequalities `row . u >= bound`, rows of unit length.
@@ -174,7 +174,7 @@ impl Constraints {
         let model = Model::new(size + 1, columns, None, Num::EPSILON);
         let mut target = vec![Num::ZERO; size + 1];
         target[size] = Num::ONE;
-        let mut basis = QrBasis::new(&model, Target::along(&target));
+        let mut basis = Basis::new(&model, Target::along(&target));
         let found = cone::solve(&mut basis, &vec![Role::Rising; count], &vec![false; count]);
         let residual = basis.residual_rate(&found.rate);
         let height = residual[size];

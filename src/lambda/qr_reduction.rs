@@ -301,14 +301,10 @@ impl Reduced {
         Pivoted::new(coils, self.coils, 0.0).members.len()
     }
 
-    /// The same problem with every dependence made exact, those too that only rounding hides, and turned so that it
-    /// has little more rows than independent columns; `None` where there is none.
+    /// The same problem with every dependence made exact, those too that only rounding hides; `None` where there is
+    /// none.
     pub(crate) fn with_clean_dependences(&self) -> Option<Clean> {
-        let pivoted = Pivoted::new(self.columns.clone(), self.coils, HIDDEN_IN_ROUNDING);
-        let rank = pivoted.members.len();
-        if rank == self.coils {
-            return None;
-        }
+        let pivoted = self.pivoted(HIDDEN_IN_ROUNDING)?;
         let length = |column: &[Num]| Num::dot(column, column).sqrt();
         let norm: Vec<Num> = self.columns.iter().map(|column| length(column)).collect();
         let mut moved = vec![Num::ZERO; self.coils];
@@ -324,7 +320,34 @@ impl Reduced {
             Num::add_scaled(&mut off, -Num::ONE, &columns[j]);
             moved[j] = length(&off);
         }
-        // The coils have nothing below their rank: one row there is enough for the heights, one more for the offset.
+        Some(self.cut(columns, pivoted.members.len(), moved))
+    }
+
+    /// The same problem without what columns have outside the span of those that are independent by more than `share`;
+    /// `None` where all are.
+    pub(crate) fn without_weak_parts(&self, share: f64) -> Option<Clean> {
+        let pivoted = self.pivoted(share)?;
+        let rank = pivoted.members.len();
+        let mut columns = pivoted.turned;
+        let cut = columns[..self.coils].iter_mut().map(|column| {
+            let outside = &mut column[rank..];
+            let length = Num::dot(outside, outside).sqrt();
+            outside.fill(Num::ZERO);
+            length
+        });
+        let moved = cut.collect();
+        Some(self.cut(columns, rank, moved))
+    }
+
+    /// `None` where all coils' columns are independent.
+    fn pivoted(&self, share: f64) -> Option<Pivoted> {
+        let pivoted = Pivoted::new(self.columns.clone(), self.coils, share);
+        (pivoted.members.len() < self.coils).then_some(pivoted)
+    }
+
+    /// Turned columns, those of coils without anything below `rank`, with the fewest rows: one below it is enough for
+    /// the heights, one more for the offset.
+    fn cut(&self, mut columns: Vec<Vec<Num>>, rank: usize, moved: Vec<Num>) -> Clean {
         let rows = self.rows().min(rank + columns.len() - self.coils);
         for (row, j) in (rank..rows).zip(self.coils..) {
             let rest = columns[j].split_off(row);
@@ -338,14 +361,14 @@ impl Reduced {
         columns
             .iter_mut()
             .for_each(|column| column.resize(rows, Num::ZERO));
-        Some(Clean {
+        Clean {
             reduced: Self {
                 columns,
                 ..self.clone()
             },
             rank,
             moved,
-        })
+        }
     }
 
     /// The target's direction per unit of lambda', in units of force.

@@ -9,7 +9,7 @@ use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 use super::certificate;
-use super::criteria::Comparison;
+use super::criteria::{Comparison, VISIBLE};
 use super::exact_start::exact_start;
 use super::homotopy::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
@@ -25,6 +25,14 @@ const PLAIN_CONDITION: f64 = 1e3;
 const INDEPENDENT: f64 = 1e10;
 /// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
 const PLAIN_ERROR: f64 = 2e-14;
+/// Share of a column outside the span of others that is weak: currents within the limits do little with it. Where the
+/// best error is of the order of the least share, multipliers are of its square and rounding over it: this is above the
+/// third root of rounding.
+const WEAK: f64 = 1e-8;
+/// The same for lambda_jnd alone.
+const WEAK_FOR_JND: f64 = 1e-6;
+/// Change of e* at lambda_jnd, relative to the excess there, that leaves lambda_jnd alone.
+const SMALL: f64 = 1e-6;
 /// Change of e*, relative to lambda^2 mean(h^2), up to which dependences are taken as exact.
 const SHOWN: f64 = 1e-11;
 /// Share of lambda^2 mean(h^2) by which the currents' error may be above e*, or the path is wrong.
@@ -95,6 +103,37 @@ pub struct Solution {
     pub accuracy: StageAccuracy,
 }
 
+/// How much of the path is needed.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Extent {
+    /// All of it.
+    Whole,
+    /// Up to lambda_jnd of this weight above zero, if there is no offset: beyond, the path comes to rest.
+    ToJnd(f64),
+}
+
+impl Extent {
+    /// What the chosen constant needs.
+    pub fn of(settings: &Settings) -> Self {
+        match settings.criterion {
+            Criterion::Jnd if settings.jnd_weight > 0.0 => Self::ToJnd(settings.jnd_weight),
+            _ => Self::Whole,
+        }
+    }
+
+    /// The share of `lambda^2` beyond which e* is not needed.
+    fn most_error(self, unlimited: &Piece, heights: &[Num]) -> Option<Num> {
+        let square = |v: &[Num]| Num::dot(v, v);
+        match self {
+            Self::Whole => None,
+            Self::ToJnd(weight) => {
+                let share = Num::of(weight) * Num::of(weight);
+                Some(square(&unlimited.residual_rate) + share * square(heights))
+            }
+        }
+    }
+}
+
 /// Both paths of one reduced problem.
 pub(super) struct Solved {
     pub reduced: Reduced,
@@ -107,6 +146,8 @@ pub(super) struct Solved {
     /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
     error: f64,
     flaw: f64,
+    /// Share of `lambda^2 mean(h^2)` up to which e* may be off since weak parts are left out.
+    pub doubt: f64,
 }
 
 /// The path without the drivers' size.
@@ -118,13 +159,13 @@ struct Unlimited {
 }
 
 impl Unlimited {
-    fn new(problem: &ForceProblem, reduced: &Reduced, condition: Option<f64>) -> Self {
+    fn new(problem: &ForceProblem, reduced: &Reduced) -> Self {
         let (model, bounds) = reduced.unlimited(problem);
         let follower = Follower {
             model: &model,
             bounds: &bounds,
-            condition,
             start: None,
+            most_error: None,
         };
         let trace = follower.path(reduced.offset().as_deref(), reduced.heights());
         let error = rounding(&model, &trace, reduced.heights());
@@ -137,27 +178,23 @@ impl Unlimited {
 }
 
 impl Solved {
-    /// `condition`: of the coils' columns, where it is known.
-    fn new(problem: &ForceProblem, reduced: Reduced, condition: Option<f64>) -> Self {
-        let unlimited = Unlimited::new(problem, &reduced, condition);
-        Self::with(problem, reduced, condition, unlimited)
+    fn new(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> Self {
+        let unlimited = Unlimited::new(problem, &reduced);
+        Self::with(problem, extent, reduced, unlimited)
     }
 
-    fn with(
-        problem: &ForceProblem,
-        reduced: Reduced,
-        condition: Option<f64>,
-        free: Unlimited,
-    ) -> Self {
+    fn with(problem: &ForceProblem, extent: Extent, reduced: Reduced, free: Unlimited) -> Self {
         let offset = reduced.offset();
         let heights = reduced.heights();
         let (model, bounds) = reduced.limited(problem);
-        let rate = &free.trace.pieces[0].residual_rate;
+        let unlimited = &free.trace.pieces[0];
+        let most_error = extent.most_error(unlimited, heights);
+        let rate = &unlimited.residual_rate;
         let follower = Follower {
             model: &model,
             bounds: &bounds,
-            condition,
             start: exact_start(problem, &reduced, (&model, &bounds), rate),
+            most_error: most_error.filter(|_| offset.is_none()),
         };
         let mut limited = follower.path(offset.as_deref(), heights);
         let mut error = rounding(&model, &limited, heights).max(free.error);
@@ -170,6 +207,7 @@ impl Solved {
             free_bounds: free.bounds,
             error,
             flaw: limited.flaw.max(free.trace.flaw),
+            doubt: 0.0,
             limited,
             unlimited: free.trace,
             reduced,
@@ -183,6 +221,7 @@ impl Solved {
             limited: &self.limited,
             unlimited: &self.unlimited,
             mean_square: Num::dot(heights, heights),
+            visible: VISIBLE.max(self.doubt),
         }
     }
 
@@ -246,9 +285,15 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    let (solved, rank, precision) = solve_paths(problem, &largest);
-    let mut path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
-    if rank < problem.coils() {
+    let (solved, rank, precision) = solve_paths(problem, &largest, Extent::Whole);
+    let mut path = Path::new(
+        problem,
+        &solved.reduced,
+        &solved.bounds,
+        &solved.limited,
+        solved.doubt,
+    );
+    if rank < problem.coils() && solved.doubt == 0.0 {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
     let finish = match precision {
@@ -268,7 +313,7 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    let (solved, rank, _) = solve_paths(problem, &largest);
+    let (solved, rank, _) = solve_paths(problem, &largest, Extent::of(settings));
     let comparison = solved.comparison();
     if status(&solved, &comparison) == Status::NothingRendered {
         return Ok(None);
@@ -278,7 +323,13 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
         Criterion::Saturation => {
-            let path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
+            let path = Path::new(
+                problem,
+                &solved.reduced,
+                &solved.bounds,
+                &solved.limited,
+                solved.doubt,
+            );
             path.last_turn().or(linear.filter(|&lambda| lambda == 0.0))
         }
         Criterion::Maxmin => worst::largest(problem, &largest).map(|most| most.lambda_n_per_m),
@@ -297,17 +348,27 @@ pub fn relative_error(
     problem.validate(&Settings::default())?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
-    let (solved, _, _) = solve_paths(problem, &largest);
+    let (solved, _, _) = solve_paths(problem, &largest, Extent::Whole);
     if status(&solved, &solved.comparison()) != Status::Solved {
         return Ok(None);
     }
-    let path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
+    let path = Path::new(
+        problem,
+        &solved.reduced,
+        &solved.bounds,
+        &solved.limited,
+        solved.doubt,
+    );
     let requested_n = lambda_n_per_m * problem.rms_height_m();
     Ok(Some(path.error_n2(lambda_n_per_m).sqrt() / requested_n))
 }
 
 /// Both paths, the number of independent columns, and the arithmetic of their reduction.
-pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, usize, Precision) {
+pub(super) fn solve_paths(
+    problem: &ForceProblem,
+    largest: &[f64],
+    extent: Extent,
+) -> (Solved, usize, Precision) {
     let coils = problem.coils();
     let mut condition = None;
     if problem.points() >= coils && !largest[..coils].contains(&0.0) {
@@ -315,7 +376,7 @@ pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, u
         let plain = reduced.condition();
         condition = Some(plain).filter(|&condition| condition <= INDEPENDENT);
         if plain <= PLAIN_CONDITION
-            && let Some(solved) = solve_plainly(problem, reduced, plain)
+            && let Some(solved) = solve_plainly(problem, extent, reduced)
         {
             return (solved, coils, Precision::Double);
         }
@@ -324,28 +385,36 @@ pub(super) fn solve_paths(problem: &ForceProblem, largest: &[f64]) -> (Solved, u
         .and_then(|condition| Reduced::by_products(problem, largest, condition))
         .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
     let (solved, rank) = match condition {
-        Some(_) => (Solved::new(problem, reduced, condition), coils),
-        None => solve_dependent(problem, reduced),
+        Some(_) => (Solved::new(problem, extent, reduced), coils),
+        None => solve_dependent(problem, extent, reduced),
     };
     (solved, rank, Precision::DoubleDouble)
 }
 
 /// From the reduction in doubles; `None` where that is not enough.
-fn solve_plainly(problem: &ForceProblem, reduced: Reduced, condition: f64) -> Option<Solved> {
-    let free = Unlimited::new(problem, &reduced, Some(condition));
+fn solve_plainly(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> Option<Solved> {
+    let free = Unlimited::new(problem, &reduced);
     if free.error > PLAIN_ERROR {
         return None;
     }
-    let solved = Solved::with(problem, reduced, Some(condition), free);
+    let solved = Solved::with(problem, extent, reduced, free);
     (solved.reliable() && solved.error <= PLAIN_ERROR).then_some(solved)
 }
 
 /// Where columns may depend on each other: dependences that lie within the rounding of the forces are
 /// taken as exact, provided that this does not show in e*. With the number of independent columns.
-fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> (Solved, usize) {
-    let clean = reduced.with_clean_dependences().map(|clean| {
+fn solve_dependent(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> (Solved, usize) {
+    let clean = reduced.with_clean_dependences();
+    let exact = match &clean {
+        Some(clean) => (&clean.reduced, clean.rank),
+        None => (&reduced, problem.coils()),
+    };
+    if let Some(solved) = solve_strong(problem, extent, &reduced, exact) {
+        return (solved, exact.1);
+    }
+    let clean = clean.map(|clean| {
         let moved = clean.most_moved(problem);
-        let mut solved = Solved::new(problem, clean.reduced, None);
+        let mut solved = Solved::new(problem, extent, clean.reduced);
         let change = solved.change(moved);
         solved.error += change;
         (solved, clean.rank, change)
@@ -354,7 +423,7 @@ fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> (Solved, usize) 
     match clean {
         Some((clean, rank, change)) if change <= SHOWN => (clean, rank),
         clean => {
-            let literal = Solved::new(problem, reduced, None);
+            let literal = Solved::new(problem, extent, reduced);
             match clean.filter(|_| !literal.reliable()) {
                 Some((clean, rank, _)) => (clean, rank),
                 None => {
@@ -364,6 +433,51 @@ fn solve_dependent(problem: &ForceProblem, reduced: Reduced) -> (Solved, usize) 
             }
         }
     }
+}
+
+/// Without the weak parts of columns, which add hundreds of breakpoints, decided by rounding where the force can be
+/// rendered all but exactly: they count for e_0 only, whose currents have no limit. `exact` has the given number of
+/// independent columns. `None` where a bound does not say that this is enough.
+fn solve_strong(
+    problem: &ForceProblem,
+    extent: Extent,
+    reduced: &Reduced,
+    (exact, rank): (&Reduced, usize),
+) -> Option<Solved> {
+    let share = match extent {
+        Extent::Whole => WEAK,
+        Extent::ToJnd(_) => WEAK_FOR_JND,
+    };
+    let strong = reduced.without_weak_parts(share)?;
+    if strong.rank == rank || problem.offset_n.is_some() {
+        return None;
+    }
+    let moved = strong.most_moved(problem);
+    let free = Unlimited::new(problem, exact);
+    let mut solved = Solved::with(problem, extent, strong.reduced, free);
+    let length = |v: &[Num]| Num::dot(v, v).sqrt();
+    let heights = solved.reduced.heights();
+    // The change is largest at the first breakpoint; lambda_jnd lies on the last piece but that of rest.
+    let pieces = &solved.limited.pieces;
+    let start = |place: usize| pieces.get(place).map(|piece| piece.start);
+    let (height, weak) = (length(heights), length(&heights[strong.rank..]));
+    let (change, most) = match extent {
+        Extent::Whole => {
+            let requested = start(1)? * height;
+            let share = weak / height + moved / requested;
+            (share * share, SHOWN)
+        }
+        Extent::ToJnd(weight) => {
+            let requested = start(pieces.len().saturating_sub(2).max(1))? * height;
+            let share = moved / requested;
+            let change = (Num::of(2.0) * weak / height + share) * share;
+            (change, SMALL * weight * weight)
+        }
+    };
+    let change = change.to_f64();
+    solved.error += change;
+    solved.doubt = change;
+    (solved.reliable() && change <= most).then_some(solved)
 }
 
 /// lambda_linear and lambda_jnd, N/m, off the two paths; null where no height is above zero.
@@ -506,13 +620,19 @@ mod tests {
             resistance_ohm: &[6.0, 6.0],
         };
         let largest = largest_entries(&problem);
-        let (mut solved, rank, precision) = solve_paths(&problem, &largest);
+        let (mut solved, rank, precision) = solve_paths(&problem, &largest, Extent::Whole);
         for (share, status) in [(1.0, Status::Solved), (0.9, Status::Stalled)] {
             for piece in &mut solved.limited.pieces {
                 let residuals = piece.residual.iter_mut().chain(&mut piece.residual_rate);
                 residuals.for_each(|residual| *residual = *residual * Num::of(share));
             }
-            let path = Path::new(&problem, &solved.reduced, &solved.bounds, &solved.limited);
+            let path = Path::new(
+                &problem,
+                &solved.reduced,
+                &solved.bounds,
+                &solved.limited,
+                solved.doubt,
+            );
             let settings = Settings {
                 at_n_per_m: Some(1.0),
                 ..Settings::default()
@@ -521,6 +641,74 @@ mod tests {
                 &problem, &largest, &settings, &solved, path, rank, precision,
             );
             assert_eq!(finished.status, status, "{share}");
+        }
+    }
+
+    /// Dipoles 10 mm apart under points 200 mm above: what is left out of nearly dependent columns changes e* by no more
+    /// than is said, and lambda_jnd not at all.
+    #[test]
+    fn weak_parts_of_columns_leave_the_force_alone() {
+        let (side, samples, height) = (7, 9, 0.2_f64);
+        let force = |i: usize, j: usize| {
+            let middle = |k: usize, of: usize| k as f64 - 0.5 * (of as f64 - 1.0);
+            let apart = |a: usize, b: usize| 0.01 * (middle(a, side) - middle(b, samples));
+            let flat = apart(i % side, j % samples).powi(2) + apart(i / side, j / samples).powi(2);
+            1e-5 * height * (2.0 * height.powi(2) - 3.0 * flat) / (flat + height.powi(2)).powf(3.5)
+        };
+        let (coils, points) = (side * side, samples * samples);
+        let forces: Vec<f64> = (0..points)
+            .flat_map(|j| (0..coils).map(move |i| force(i, j)))
+            .collect();
+        let all = |value: f64| vec![value; coils];
+        // What uneven currents give, so that limits alone leave an error.
+        let heights: Vec<f64> = (forces.chunks_exact(coils))
+            .map(|row| {
+                let currents = (0..coils).map(|i| 1.0 + 0.5 * (i as f64).sin());
+                row.iter().zip(currents).map(|(f, i)| f * i).sum::<f64>()
+            })
+            .collect();
+        let problem = ForceProblem {
+            forces_n_per_a: &forces,
+            height_m: &heights,
+            offset_n: None,
+            weights: None,
+            lower_a: &all(0.0),
+            upper_a: &all(2.0),
+            total_max_a: None,
+            resistance_ohm: &all(6.1),
+        };
+        let weight = Settings::default().jnd_weight;
+        let reduced = Reduced::new::<Num>(&problem, &largest_entries(&problem));
+        let (exact, rank) = match reduced.with_clean_dependences() {
+            Some(clean) => (clean.reduced, clean.rank),
+            None => (reduced.clone(), coils),
+        };
+        let literal = Solved::new(&problem, Extent::Whole, exact.clone());
+        let jnd = |solved: &Solved| solved.comparison().jnd(weight).unwrap().to_f64();
+        let e = |solved: &Solved, lambda: Num| {
+            let pieces = &solved.limited.pieces;
+            let later = pieces.partition_point(|piece| piece.start <= lambda);
+            let residual = pieces[later - 1].residual_at(lambda);
+            Num::dot(&residual, &residual)
+        };
+        for extent in [Extent::Whole, Extent::ToJnd(weight)] {
+            let strong = solve_strong(&problem, extent, &reduced, (&exact, rank)).unwrap();
+            assert!(strong.reduced.heights().len() < rank && strong.doubt > 0.0);
+            assert!((jnd(&strong) / jnd(&literal) - 1.0).abs() < 1e-9);
+            let until = match extent {
+                Extent::Whole => 3.0,
+                Extent::ToJnd(_) => 1.0,
+            };
+            for k in 1..40 {
+                let lambda = Num::of(until * jnd(&literal) * f64::from(k) / 40.0);
+                let requested = lambda * lambda * literal.comparison().mean_square;
+                let off = ((e(&strong, lambda) - e(&literal, lambda)) / requested).to_f64();
+                let known = match extent {
+                    Extent::Whole => strong.doubt,
+                    Extent::ToJnd(weight) => SMALL * weight * weight,
+                };
+                assert!(off.abs() <= known, "{k}: {off:e} {known:e}");
+            }
         }
     }
 }

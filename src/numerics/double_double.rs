@@ -159,7 +159,66 @@ impl Kernel for AddMultiple<'_> {
     }
 }
 
+/// Turns entries k and k + 1 of some columns by rotation k, one after another.
+struct Rotate<'a, const COLUMNS: usize>(&'a [[DoubleDouble; 2]], [&'a mut [DoubleDouble]; COLUMNS]);
+
+impl<const COLUMNS: usize> Kernel for Rotate<'_, COLUMNS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let Self(rotations, columns) = self;
+        let Some(last) = rotations.len().checked_sub(1) else {
+            return;
+        };
+        let columns = columns.map(|column| &mut column[..last + 2]);
+        let (mut high, mut low) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+        for c in 0..COLUMNS {
+            (high[c], low[c]) = (columns[c][0].hi, columns[c][0].lo);
+        }
+        for (k, &[cos, sin]) in rotations.iter().enumerate() {
+            let (mut b_high, mut b_low) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+            for c in 0..COLUMNS {
+                (b_high[c], b_low[c]) = (columns[c][k + 1].hi, columns[c][k + 1].lo);
+            }
+            let (mut out_high, mut out_low) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+            for c in 0..COLUMNS {
+                let at = |hi: &[f64; COLUMNS], lo: &[f64; COLUMNS]| DoubleDouble {
+                    hi: hi[c],
+                    lo: lo[c],
+                };
+                let (a, b) = (at(&high, &low), at(&b_high, &b_low));
+                let first = product::<FMA>(cos, a) + product::<FMA>(sin, b);
+                let second = product::<FMA>(cos, b) - product::<FMA>(sin, a);
+                (out_high[c], out_low[c]) = (first.hi, first.lo);
+                (high[c], low[c]) = (second.hi, second.lo);
+            }
+            for c in 0..COLUMNS {
+                columns[c][k] = DoubleDouble {
+                    hi: out_high[c],
+                    lo: out_low[c],
+                };
+            }
+        }
+        for c in 0..COLUMNS {
+            columns[c][last + 1] = DoubleDouble {
+                hi: high[c],
+                lo: low[c],
+            };
+        }
+    }
+}
+
 impl DoubleDouble {
+    /// Turns the first two entries of each column by the first rotation `[cos, sin]`, then the second and the third by the
+    /// next, and so on; the same bits on every machine and beside any other columns.
+    ///
+    /// # Panics
+    /// Where a column has fewer entries than there are rotations and one more.
+    pub fn rotate<const COLUMNS: usize>(rotations: &[[Self; 2]], columns: [&mut [Self]; COLUMNS]) {
+        dispatch::run(Rotate(rotations, columns));
+    }
+
     /// Sum of products over the shorter length; the same bits on every machine.
     #[must_use]
     pub fn sum_of_products(a: &[Self], b: &[Self]) -> Self {
@@ -308,6 +367,32 @@ mod tests {
     }
 
     /// Vector instructions change nothing: sums and multiples have the bits of the plain operations.
+    /// Four at once have the bits of one alone, and lengths stay.
+    #[test]
+    fn rotations_of_columns_side_by_side_have_the_bits_of_each_alone() {
+        let exact = DoubleDouble::exactly;
+        let third = |k: i32| exact(f64::from(k)) / exact(3.0);
+        let columns = [1, 4, -2, 7].map(|k| [third(k), third(k + 1), third(2 - k), third(k * k)]);
+        let rotations = [3.0, -4.0, 0.75].map(|tan| {
+            let cos = exact(1.0) / (exact(1.0) + exact(tan) * exact(tan)).square_root();
+            [cos, exact(tan) * cos]
+        });
+        let square = |v: &[DoubleDouble]| DoubleDouble::sum_of_products(v, v);
+        let (mut together, mut alone) = (columns, columns);
+        let [a, b, c, d] = &mut together;
+        DoubleDouble::rotate(&rotations, [a, b, c, d].map(|column| &mut column[..]));
+        for (k, column) in alone.iter_mut().enumerate() {
+            DoubleDouble::rotate(&rotations, [&mut column[..]]);
+            assert_eq!(*column, together[k]);
+            let off = square(column) - square(&columns[k]);
+            assert!(off.nearest().abs() < 1e-29);
+        }
+        // The first entry of the first column: cos / 3 + sin 2 / 3 of the first rotation.
+        let [cos, sin] = rotations[0];
+        let first = third(1) * cos + third(2) * sin;
+        assert!((together[0][0] - first).nearest().abs() < 1e-30);
+    }
+
     #[test]
     fn sums_over_lists_have_the_bits_of_one_operation_after_another() {
         let mut random = crate::random::Random::new(3);
