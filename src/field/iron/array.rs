@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bodies::{Coils, Iron};
 use super::face::{Node, Point, SAME_M};
+use super::parts::Halvings;
 use super::potential::Branch;
 use super::surface::{Surface, mirrored};
 use super::system::{System, TooMany};
@@ -37,6 +38,8 @@ pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
 const SOLVER_SHARE: f64 = 0.02;
 /// Steps from the best node to the largest |B|.
 const CLIMBS: usize = 12;
+/// Places, one after the other along the surface, that share the parts of panels close to them.
+const NEIGHBOURS: usize = 32;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
 
@@ -322,7 +325,8 @@ impl IronArray {
     /// # Errors
     /// A place on a winding's edge.
     pub fn field_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
-        self.field_of(place_m, currents_a, &self.layers_at(currents_a))
+        let layers = self.layers_at(currents_a);
+        self.field_of(place_m, currents_a, &layers, &mut Halvings::new())
     }
 
     /// The largest difference of B from what the next coarser resolution has at `places_m`, off the surface, relative to
@@ -356,11 +360,12 @@ impl IronArray {
         self.layers.iter().map(of_image).collect()
     }
 
-    fn field_of(
-        &self,
+    fn field_of<'a>(
+        &'a self,
         place_m: Point,
         currents_a: &[f64],
         layers: &[Vec<f64>],
+        halvings: &mut Halvings<'a>,
     ) -> Result<Point, OnEdge> {
         fluxform_base::progress::poll();
         let mut sum = [0.0; 3];
@@ -368,7 +373,7 @@ impl IronArray {
             let [cx, cy] = self.planes_m;
             let [x, y, z] = place_m;
             let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            let [bx, by, bz] = self.surface.field_t(own, values);
+            let [bx, by, bz] = self.surface.field_near(own, values, halvings);
             sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
         }
         for ([x, y], current) in self.positions_m.iter().zip(currents_a) {
@@ -499,7 +504,8 @@ impl IronArray {
         let other = coarser.own_peaks(currents_a, depth_m)?;
         let layers = coarser.layers_at(currents_a);
         let compare = |peak: &mut Peak, other: &Peak| -> Result<(), OnEdge> {
-            let here = norm(coarser.field_of(peak.place_m, currents_a, &layers)?);
+            let halvings = &mut Halvings::new();
+            let here = norm(coarser.field_of(peak.place_m, currents_a, &layers, halvings)?);
             let apart = |value_t: f64| (peak.field_t - value_t).abs();
             peak.error_t = Some(apart(here).max(apart(other.field_t)));
             Ok(())
@@ -514,7 +520,7 @@ impl IronArray {
     }
 
     /// The same, without errors.
-    fn own_peaks(&self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
+    fn own_peaks<'a>(&'a self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
         let mut nodes: Vec<Candidate> = Vec::new();
         for (image, signs) in self.images.iter().enumerate() {
             nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
@@ -548,11 +554,19 @@ impl IronArray {
             }
         }
         let layers = self.layers_at(currents_a);
-        let field_t = |place: Point| Ok(norm(self.field_of(place, currents_a, &layers)?));
+        let field_t = |place: Point, halvings: &mut Halvings<'a>| {
+            Ok(norm(self.field_of(place, currents_a, &layers, halvings)?))
+        };
+        let of_neighbours = |candidates: &[&Candidate]| {
+            let mut halvings = Halvings::new();
+            let of_each = |candidate: &&Candidate| field_t(candidate.place_m, &mut halvings);
+            candidates.iter().map(of_each).collect()
+        };
         let values = sparse
-            .par_iter()
-            .map(|candidate| field_t(candidate.place_m))
-            .collect::<Result<Vec<_>, OnEdge>>()?;
+            .par_chunks(NEIGHBOURS)
+            .map(of_neighbours)
+            .collect::<Result<Vec<Vec<f64>>, OnEdge>>()?
+            .concat();
         let cores = if nodes.iter().any(|node| node.core.is_some()) {
             currents_a.len()
         } else {
@@ -580,12 +594,12 @@ impl IronArray {
     }
 
     /// From a node's place to the largest |B| about it, along the surface at the same depth.
-    fn climb(
-        &self,
+    fn climb<'a>(
+        &'a self,
         value_t: f64,
         from: &Candidate,
         depth_m: f64,
-        field_t: &impl Fn(Point) -> Result<f64, OnEdge>,
+        field_t: &impl Fn(Point, &mut Halvings<'a>) -> Result<f64, OnEdge>,
         deep: &impl Fn(Point) -> bool,
     ) -> Result<Peak, OnEdge> {
         let face = self.surface.face_of(from.number);
@@ -595,6 +609,7 @@ impl IronArray {
             place_m: from.place_m,
             error_t: None,
         };
+        let mut halvings = Halvings::new();
         for _ in 0..CLIMBS {
             let before = peak.field_t;
             let [du, dv] = step;
@@ -610,7 +625,7 @@ impl IronArray {
                 if !deep(place_m) {
                     continue;
                 }
-                let value = field_t(place_m)?;
+                let value = field_t(place_m, &mut halvings)?;
                 if value > peak.field_t {
                     (u, v) = (a, b);
                     (peak.field_t, peak.place_m) = (value, place_m);

@@ -227,26 +227,20 @@ impl Face {
     /// A point and the normal there, as long as the surface's measure.
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> (Point, Point) {
-        let (at, along_u, along_v) = match &self.shape {
-            Shape::Ruled(a, b) => {
-                let ((pa, sa), (pb, sb)) = (a.at(u), b.at(u));
-                let mix = |x: Point, y: Point| std::array::from_fn(|i| (1.0 - v) * x[i] + v * y[i]);
-                (mix(pa, pb), mix(sa, sb), minus(pb, pa))
-            }
-            Shape::Ball {
-                centre_m,
-                half_m,
-                axis,
-                sign,
-            } => ball_point(*centre_m, *half_m, *axis, *sign, u, v),
+        self.across(u).at(v)
+    }
+
+    /// The line of one u.
+    fn across(&self, u: f64) -> Across<'_> {
+        let ends = match &self.shape {
+            Shape::Ruled(a, b) => [a.at(u), b.at(u)],
+            Shape::Ball { .. } => Default::default(),
         };
-        let normal = cross(along_u, along_v);
-        let normal = if self.flipped {
-            normal.map(|n| -n)
-        } else {
-            normal
-        };
-        (at, normal)
+        Across {
+            face: self,
+            u,
+            ends,
+        }
     }
 
     /// Its corners and its middle, m.
@@ -333,6 +327,40 @@ impl Face {
             }
         }
         panels
+    }
+}
+
+/// Points of a face at one u: what depends on u alone is computed once for all of them.
+struct Across<'a> {
+    face: &'a Face,
+    u: f64,
+    /// Of a ruled face the ends of the line, and their slopes along u.
+    ends: [(Point, Point); 2],
+}
+
+impl Across<'_> {
+    /// A point and the normal there, as long as the surface's measure.
+    fn at(&self, v: f64) -> (Point, Point) {
+        let (at, along_u, along_v) = match &self.face.shape {
+            Shape::Ruled(..) => {
+                let [(pa, sa), (pb, sb)] = self.ends;
+                let mix = |x: Point, y: Point| std::array::from_fn(|i| (1.0 - v) * x[i] + v * y[i]);
+                (mix(pa, pb), mix(sa, sb), minus(pb, pa))
+            }
+            Shape::Ball {
+                centre_m,
+                half_m,
+                axis,
+                sign,
+            } => ball_point(*centre_m, *half_m, *axis, *sign, self.u, v),
+        };
+        let normal = cross(along_u, along_v);
+        let normal = if self.face.flipped {
+            normal.map(|n| -n)
+        } else {
+            normal
+        };
+        (at, normal)
     }
 }
 
@@ -434,17 +462,18 @@ impl Panel {
     pub(super) fn new(face: &Face, number: usize, range: [f64; 4], order: usize) -> Self {
         let [u0, u1, v0, v1] = range;
         let (um, vm) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
-        let at = |u, v| face.point(u, v).0;
-        let (centre_m, normal) = face.point(um, vm);
+        let [first, middle, last] = [u0, um, u1].map(|u| face.across(u));
+        let at = |line: &Across<'_>, v| line.at(v).0;
+        let (centre_m, normal) = middle.at(vm);
         let rim = [
-            at(u0, v0),
-            at(u0, v1),
-            at(u1, v0),
-            at(u1, v1),
-            at(um, v0),
-            at(um, v1),
-            at(u0, vm),
-            at(u1, vm),
+            at(&first, v0),
+            at(&first, v1),
+            at(&last, v0),
+            at(&last, v1),
+            at(&middle, v0),
+            at(&middle, v1),
+            at(&first, vm),
+            at(&last, vm),
         ];
         let radius_m = (rim.iter()).fold(0.0_f64, |r, p| r.max(norm(minus(*p, centre_m))));
         let apart = |a: usize, b: usize| norm(minus(rim[a], rim[b]));
@@ -482,10 +511,9 @@ impl Panel {
         let quarter = 0.25 * (u1 - u0) * (v1 - v0);
         let mut nodes = Vec::with_capacity(orders[0] * orders[1]);
         for (x, weight_u) in first.nodes.iter().zip(&first.weights) {
+            let line = face.across(u0 + 0.5 * (u1 - u0) * (1.0 + x));
             for (y, weight_v) in second.nodes.iter().zip(&second.weights) {
-                let u = u0 + 0.5 * (u1 - u0) * (1.0 + x);
-                let v = v0 + 0.5 * (v1 - v0) * (1.0 + y);
-                let (place_m, normal) = face.point(u, v);
+                let (place_m, normal) = line.at(v0 + 0.5 * (v1 - v0) * (1.0 + y));
                 let weight = quarter * weight_u * weight_v;
                 nodes.push(Node {
                     place_m,

@@ -18,6 +18,7 @@ pub mod bodies;
 pub mod clearance;
 pub mod face;
 pub mod mesh_body;
+mod parts;
 pub mod passive;
 pub mod plate;
 pub mod potential;

@@ -5,20 +5,15 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
+use super::parts::{Halvings, Parts};
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
 use fluxform_numerics::vec3::{dot, minus, norm};
 
-/// Distances in half sides from which on a panel's own nodes integrate the kernel, and from which on those
-/// of a finer rule do.
+/// Distance in half sides from which on a panel's own nodes integrate the kernel.
 const FAR: f64 = 3.0;
-const NEAR: f64 = 1.1;
-/// Halvings about a place on a curved panel itself, after which what is left is nothing.
-const MOST_HALVINGS: usize = 14;
-/// Nodes of the finer rule beyond the panel's own.
-const MORE_NODES: usize = 3;
 /// Most nodes along a panel's side.
 const MOST_ORDER: usize = 16;
 /// Length of the panels of dipoles relative to their distance.
@@ -92,24 +87,19 @@ impl Surface {
     /// Adds to `row` what the layer of every node gives at `target_m`:
     /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
     pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
-        let mut scratch = [Vec::new(), Vec::new()];
         for panel in 0..self.panels.len() {
-            self.add_panel(
-                target_m,
-                panel,
-                &mut row[self.nodes_of(panel)],
-                &mut scratch,
-            );
+            let row = &mut row[self.nodes_of(panel)];
+            self.add_panel(target_m, panel, row, &mut self.parts_of(panel));
         }
     }
 
-    /// The same of the nodes of one panel.
+    /// The same of the nodes of one panel, which is given with its parts.
     pub(super) fn add_panel(
         &self,
         target_m: Point,
         panel: usize,
         row: &mut [f64],
-        scratch: &mut [Vec<f64>; 2],
+        parts: &mut Parts<'_>,
     ) {
         let nodes = self.nodes_of(panel);
         let panel = &self.panels[panel];
@@ -126,7 +116,7 @@ impl Surface {
                 *value += kernel(target_m, node);
             }
         } else {
-            self.add_near(target_m, panel, row, scratch);
+            add_near(target_m, panel.order, row, parts);
         }
     }
 
@@ -141,86 +131,27 @@ impl Surface {
         first..first + self.panels[panel].order.pow(2)
     }
 
-    /// Visits parts of a panel small enough for a rule of [`MORE_NODES`] more nodes to integrate the kernel
-    /// at `target_m`.
-    fn parts(
-        &self,
-        target_m: Point,
-        part: &Panel,
-        halvings: usize,
-        visit: &mut impl FnMut(&Panel),
-    ) {
-        let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
-        let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
-        // Of a plane panel nothing is left to singularities; halving ends by itself.
-        let most = if part.plane.is_none() {
-            MOST_HALVINGS
-        } else {
-            8 * MOST_HALVINGS
-        };
-        if distance < NEAR * half && halvings < most {
-            for half in part.halves(&self.faces[part.face]) {
-                self.parts(target_m, &half, halvings + 1, visit);
-            }
-        } else {
-            visit(part);
-        }
-    }
-
-    /// The panel's basis at the nodes of a rule with `order` nodes along each side of a part of it.
-    fn basis_on(&self, whole: &Panel, part: &Panel, order: usize, out: &mut [Vec<f64>; 2]) {
-        let (count, basis) = (whole.order, &self.bases[whole.order - 1]);
-        for (side, out) in out.iter_mut().enumerate() {
-            let (lo, hi) = (whole.range[2 * side], whole.range[2 * side + 1]);
-            let (from, to) = (part.range[2 * side], part.range[2 * side + 1]);
-            out.resize(order * count, 0.0);
-            for (x, weights) in gauss::rule(order)
-                .nodes
-                .iter()
-                .zip(out.chunks_exact_mut(count))
-            {
-                let at = from + 0.5 * (to - from) * (1.0 + x);
-                basis.weights(2.0 * (at - lo) / (hi - lo) - 1.0, weights);
-            }
-        }
-    }
-
-    fn add_near(
-        &self,
-        target_m: Point,
-        whole: &Panel,
-        row: &mut [f64],
-        scratch: &mut [Vec<f64>; 2],
-    ) {
-        let (order, count) = (whole.order + MORE_NODES, whole.order);
-        let face = &self.faces[whole.face];
-        self.parts(target_m, whole, 0, &mut |part| {
-            self.basis_on(whole, part, order, scratch);
-            let [first, second] = &*scratch;
-            let mut line = [0.0; MOST_ORDER];
-            let nodes = part.nodes(face, [order; 2]);
-            for (nodes, first) in nodes.chunks_exact(order).zip(first.chunks_exact(count)) {
-                line[..count].fill(0.0);
-                for (node, second) in nodes.iter().zip(second.chunks_exact(count)) {
-                    let value = kernel(target_m, node);
-                    for (sum, weight) in line.iter_mut().zip(second) {
-                        *sum += value * weight;
-                    }
-                }
-                for (weight, row) in first.iter().zip(row.chunks_exact_mut(count)) {
-                    for (value, sum) in row.iter_mut().zip(&line) {
-                        *value += weight * sum;
-                    }
-                }
-            }
-        });
+    /// The parts of a panel: none yet.
+    pub(super) fn parts_of(&self, panel: usize) -> Parts<'_> {
+        let panel = &self.panels[panel];
+        Parts::new(&self.faces[panel.face], &self.bases[panel.order - 1], panel)
     }
 
     /// B of the layer `values`, one per node, at a place off the surface, T.
     #[must_use]
     pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
+        self.field_near(target_m, values, &mut Halvings::new())
+    }
+
+    /// The same with the parts of panels that places before it took.
+    pub(super) fn field_near<'a>(
+        &'a self,
+        target_m: Point,
+        values: &[f64],
+        halvings: &mut Halvings<'a>,
+    ) -> Point {
         let mut sum = [0.0; 3];
-        self.elements(target_m, values, |node, value| {
+        self.elements(target_m, values, halvings, |node, value| {
             add_dipole(target_m, node, value, &mut sum);
         });
         sum
@@ -230,7 +161,7 @@ impl Surface {
     #[must_use]
     pub(super) fn induced(&self, target_m: Point, values: &[f64]) -> Induced {
         let mut sum = Induced::default();
-        self.elements(target_m, values, |node, value| {
+        self.elements(target_m, values, &mut Halvings::new(), |node, value| {
             let strength = MU_0_T_M_PER_A * value / (4.0 * PI);
             sum.add_element(minus(target_m, node.place_m), node.area_m2, strength);
         });
@@ -239,10 +170,15 @@ impl Surface {
 
     /// Visits nodes with the layer `values` there, close enough to integrate what they give at a place off
     /// the surface.
-    fn elements(&self, target_m: Point, values: &[f64], mut visit: impl FnMut(&Node, f64)) {
-        let mut scratch = [Vec::new(), Vec::new()];
-        for (panel, first) in self.panels.iter().zip(&self.firsts) {
-            let (order, count) = (panel.order + MORE_NODES, panel.order);
+    fn elements<'a>(
+        &'a self,
+        target_m: Point,
+        values: &[f64],
+        halvings: &mut Halvings<'a>,
+        mut visit: impl FnMut(&Node, f64),
+    ) {
+        for (number, (panel, first)) in self.panels.iter().zip(&self.firsts).enumerate() {
+            let count = panel.order;
             let own = *first..first + count * count;
             let values = &values[own.clone()];
             let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
@@ -252,12 +188,13 @@ impl Surface {
                 }
                 continue;
             }
-            self.parts(target_m, panel, 0, &mut |part| {
-                self.basis_on(panel, part, order, &mut scratch);
-                let nodes = part.nodes(&self.faces[panel.face], [order; 2]);
-                for (k, node) in nodes.iter().enumerate() {
-                    let first = &scratch[0][k / order * count..][..count];
-                    let second = &scratch[1][k % order * count..][..count];
+            let parts = halvings
+                .entry(number)
+                .or_insert_with(|| self.parts_of(number));
+            parts.visit(target_m, &mut |rule| {
+                for (k, node) in rule.nodes.iter().enumerate() {
+                    let first = &rule.bases[0][k / rule.order * count..][..count];
+                    let second = &rule.bases[1][k % rule.order * count..][..count];
                     let value: f64 = (first.iter().zip(values.chunks_exact(count)))
                         .map(|(a, row)| a * row.iter().zip(second).map(|(v, b)| v * b).sum::<f64>())
                         .sum();
@@ -421,6 +358,29 @@ pub(super) fn mirrored(node: &Node, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> N
         place_m: [cx + sx * (x - cx), cy + sy * (y - cy), z],
         area_m2: [sx * ax, sy * ay, az],
     }
+}
+
+/// Adds to `row` what the nodes of a panel give at `target_m` close to it, `count` along each side.
+fn add_near(target_m: Point, count: usize, row: &mut [f64], parts: &mut Parts<'_>) {
+    parts.visit(target_m, &mut |rule| {
+        let [first, second] = &rule.bases;
+        let mut line = [0.0; MOST_ORDER];
+        let lines = rule.nodes.chunks_exact(rule.order);
+        for (nodes, first) in lines.zip(first.chunks_exact(count)) {
+            line[..count].fill(0.0);
+            for (node, second) in nodes.iter().zip(second.chunks_exact(count)) {
+                let value = kernel(target_m, node);
+                for (sum, weight) in line.iter_mut().zip(second) {
+                    *sum += value * weight;
+                }
+            }
+            for (weight, row) in first.iter().zip(row.chunks_exact_mut(count)) {
+                for (value, sum) in row.iter_mut().zip(&line) {
+                    *value += weight * sum;
+                }
+            }
+        }
+    });
 }
 
 #[inline]

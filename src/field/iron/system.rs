@@ -334,28 +334,27 @@ impl Assembly<'_> {
     /// What the nodes of cluster `other` give at every image of those of `own`.
     fn images_of(&self, own: usize, other: usize) -> Vec<DMatrix<f64>> {
         let (targets, nodes) = (self.clusters.places(own), self.clusters.places(other));
-        let mut scratch = [Vec::new(), Vec::new()];
-        let mut row = vec![0.0; nodes.len()];
-        let of_image = |signs: &[f64; 2]| {
-            let mut part = DMatrix::zeros(targets.len(), nodes.len());
-            for (at, target) in targets.iter().enumerate() {
-                row.fill(0.0);
-                let target = mirrored(&self.surface.nodes[*target], *signs, self.iron.planes_m);
-                let mut first = 0;
-                for panel in &self.clusters.items[other] {
-                    let count = self.surface.nodes_of(*panel).len();
-                    let of_panel = &mut row[first..first + count];
-                    self.surface
-                        .add_panel(target.place_m, *panel, of_panel, &mut scratch);
-                    first += count;
-                }
-                for (k, (value, node)) in row.iter().zip(nodes).enumerate() {
-                    part[(at, k)] = value * self.strengths[*node];
+        let mut parts = vec![DMatrix::zeros(targets.len(), nodes.len()); self.images.len()];
+        let mut first = 0;
+        for panel in &self.clusters.items[other] {
+            let of_panel = self.surface.nodes_of(*panel);
+            let strengths = &self.strengths[of_panel.clone()];
+            let mut row = vec![0.0; of_panel.len()];
+            let mut halvings = self.surface.parts_of(*panel);
+            for (signs, part) in self.images.iter().zip(&mut parts) {
+                for (at, target) in targets.iter().enumerate() {
+                    let target = &self.surface.nodes[*target];
+                    let target_m = mirrored(target, *signs, self.iron.planes_m).place_m;
+                    row.fill(0.0);
+                    (self.surface).add_panel(target_m, *panel, &mut row, &mut halvings);
+                    for (k, (value, strength)) in row.iter().zip(strengths).enumerate() {
+                        part[(at, first + k)] = value * strength;
+                    }
                 }
             }
-            part
-        };
-        self.images.iter().map(of_image).collect()
+            first += of_panel.len();
+        }
+        parts
     }
 
     /// Whether every image of cluster `own` is far from `other`.

@@ -1,0 +1,133 @@
+//! The parts into which a panel is halved towards places close to it, with their nodes: kept from one place to the
+//! next, because places near each other take mostly the same ones.
+
+use std::collections::BTreeMap;
+
+use super::face::{Face, Node, Panel, Point};
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
+use fluxform_numerics::vec3::{minus, norm};
+
+/// Distance in half sides from which on the nodes of a finer rule integrate the kernel.
+const NEAR: f64 = 1.1;
+/// Halvings about a place on a curved panel itself, after which what is left is nothing.
+const MOST_HALVINGS: usize = 14;
+/// Nodes of the finer rule beyond the panel's own.
+const MORE_NODES: usize = 3;
+
+/// A panel of a face and its parts so far.
+pub(super) struct Parts<'a> {
+    face: &'a Face,
+    basis: &'a Basis,
+    /// The whole panel first.
+    parts: Vec<Part>,
+}
+
+/// Those of the panels of a surface that places were close to, by their numbers.
+pub(super) type Halvings<'a> = BTreeMap<usize, Parts<'a>>;
+
+struct Part {
+    panel: Panel,
+    /// The number of the first of its halves; the other follows.
+    halves: Option<usize>,
+    rule: Option<Rule>,
+}
+
+/// The finer rule on a part.
+pub(super) struct Rule {
+    /// Nodes along each side.
+    pub(super) order: usize,
+    /// `order` along v for every one along u.
+    pub(super) nodes: Vec<Node>,
+    /// The whole panel's basis at the nodes along u and along v.
+    pub(super) bases: [Vec<f64>; 2],
+}
+
+impl<'a> Parts<'a> {
+    /// Those of `panel`, with the basis on its nodes along a side.
+    pub(super) fn new(face: &'a Face, basis: &'a Basis, panel: &Panel) -> Self {
+        Self {
+            face,
+            basis,
+            parts: vec![Part::new(*panel)],
+        }
+    }
+
+    /// Visits parts small enough for their rules to integrate the kernel at `target_m`.
+    pub(super) fn visit(&mut self, target_m: Point, visit: &mut impl FnMut(&Rule)) {
+        self.visit_part(target_m, 0, 0, visit);
+    }
+
+    fn visit_part(
+        &mut self,
+        target_m: Point,
+        number: usize,
+        halvings: usize,
+        visit: &mut impl FnMut(&Rule),
+    ) {
+        let part = &self.parts[number].panel;
+        let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
+        let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
+        // Of a plane panel nothing is left to singularities; halving ends by itself.
+        let most = if part.plane.is_none() {
+            MOST_HALVINGS
+        } else {
+            8 * MOST_HALVINGS
+        };
+        if distance < NEAR * half && halvings < most {
+            let first = self.halves(number);
+            for half in [first, first + 1] {
+                self.visit_part(target_m, half, halvings + 1, visit);
+            }
+        } else {
+            let (whole, part) = (self.parts[0].panel, &mut self.parts[number]);
+            let rule = (part.rule)
+                .get_or_insert_with(|| Rule::new(self.face, self.basis, &whole, &part.panel));
+            visit(rule);
+        }
+    }
+
+    /// The number of the first of a part's halves.
+    fn halves(&mut self, number: usize) -> usize {
+        if let Some(first) = self.parts[number].halves {
+            return first;
+        }
+        let first = self.parts.len();
+        let halves = self.parts[number].panel.halves(self.face);
+        self.parts.extend(halves.map(Part::new));
+        self.parts[number].halves = Some(first);
+        first
+    }
+}
+
+impl Part {
+    fn new(panel: Panel) -> Self {
+        Self {
+            panel,
+            halves: None,
+            rule: None,
+        }
+    }
+}
+
+impl Rule {
+    fn new(face: &Face, basis: &Basis, whole: &Panel, part: &Panel) -> Self {
+        let order = whole.order + MORE_NODES;
+        let values = |side: usize| {
+            let (lo, hi) = (whole.range[2 * side], whole.range[2 * side + 1]);
+            let (from, to) = (part.range[2 * side], part.range[2 * side + 1]);
+            let mut values = vec![0.0; order * whole.order];
+            let places = values.chunks_exact_mut(whole.order);
+            for (x, weights) in gauss::rule(order).nodes.iter().zip(places) {
+                let at = from + 0.5 * (to - from) * (1.0 + x);
+                basis.weights(2.0 * (at - lo) / (hi - lo) - 1.0, weights);
+            }
+            values
+        };
+        Self {
+            order,
+            nodes: part.nodes(face, [order; 2]),
+            bases: [values(0), values(1)],
+        }
+    }
+}
