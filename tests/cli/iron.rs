@@ -1,5 +1,7 @@
 //! A plate below the cores and other bodies of steel.
 
+use std::sync::LazyLock;
+
 use serde_json::Value;
 
 use fluxform_testing::place::Place;
@@ -39,6 +41,18 @@ fn evaluated_to(place: &Place, more: &str, tolerance: &str) -> Value {
     place.run(&[&args[..], &options].concat()).ends(0).json()
 }
 
+/// The pair without a plate and on one, as tests ask for them, each evaluated once.
+static ALONE: LazyLock<Value> = LazyLock::new(|| settling(CORE));
+static ON_PLATE: LazyLock<Value> = LazyLock::new(|| settling(PLATE));
+
+/// With a limit of the settling time, which changes nothing else.
+fn settling(more: &str) -> Value {
+    evaluated(
+        &Place::new(),
+        &format!("{more}[limits]\nsettling_max_ms = 1e6\n"),
+    )
+}
+
 fn inductance_h(result: &Value) -> f64 {
     result["array"]["coils"][0]["inductance_h"]
         .as_f64()
@@ -65,9 +79,7 @@ fn norm(field: [f64; 3]) -> f64 {
 /// The limit stood at the coil's own time, without the plate that it stands on.
 #[test]
 fn a_plate_counts_in_the_settling_limit_of_a_coil() {
-    let place = Place::new();
-    let limits = |more: &str| {
-        let evaluation = evaluated(&place, &format!("{more}[limits]\nsettling_max_ms = 1e6\n"));
+    let limits = |evaluation: &Value| {
         let limit = evaluation["limits"]["settling_s"]["value"]
             .as_f64()
             .unwrap();
@@ -83,9 +95,9 @@ fn a_plate_counts_in_the_settling_limit_of_a_coil() {
             evaluation["coil"]["settling_s"].as_f64().unwrap(),
         )
     };
-    let (limit, _, alone) = limits(CORE);
+    let (limit, _, alone) = limits(&ALONE);
     assert_eq!(limit, alone);
-    let (limit, own, alone) = limits(PLATE);
+    let (limit, own, alone) = limits(&ON_PLATE);
     assert!(
         (limit / own - 1.0).abs() < 1e-12 && limit > 1.1 * alone,
         "{limit} {own} {alone}"
@@ -95,11 +107,10 @@ fn a_plate_counts_in_the_settling_limit_of_a_coil() {
 #[test]
 fn a_plate_joins_the_cores_and_one_far_below_does_nothing() {
     let place = Place::new();
-    let alone = evaluated(&place, CORE);
-    let joined = evaluated(&place, PLATE);
+    let (alone, joined) = (&*ALONE, &*ON_PLATE);
     let far = evaluated(&place, &format!("{PLATE}gap_mm = 200.0\n"));
-    assert!(inductance_h(&joined) > 1.15 * inductance_h(&alone));
-    assert!((inductance_h(&far) / inductance_h(&alone) - 1.0).abs() < 0.01);
+    assert!(inductance_h(joined) > 1.15 * inductance_h(alone));
+    assert!((inductance_h(&far) / inductance_h(alone) - 1.0).abs() < 0.01);
     let iron = &joined["array"]["iron"];
     assert!(iron["peak_field_t"].as_f64().unwrap() > 0.1);
     let own = joined["coil"]["settling_s"].as_f64().unwrap();
@@ -267,7 +278,7 @@ fn a_sweep_over_plates_has_what_evaluate_has() {
         let column = rows[0].iter().position(|head| *head == name).unwrap();
         rows[row][column].parse().unwrap()
     };
-    let known = evaluated(&place, PLATE);
+    let known = &*ON_PLATE;
     let iron = &known["array"]["iron"];
     assert_eq!(
         cell(2, "iron_peak_field_t"),
@@ -277,7 +288,7 @@ fn a_sweep_over_plates_has_what_evaluate_has() {
         cell(2, "array_settling_s"),
         iron["settling_s"].as_f64().unwrap()
     );
-    assert_eq!(cell(2, "array_inductance_h"), inductance_h(&known));
+    assert_eq!(cell(2, "array_inductance_h"), inductance_h(known));
     assert!(cell(1, "iron_peak_field_t") > cell(2, "iron_peak_field_t"));
     assert!(cell(1, "array_inductance_h") < cell(2, "array_inductance_h"));
 }
@@ -354,7 +365,7 @@ fn a_mesh_counts_as_the_body_that_it_bounds() {
     let by_sides = "[[iron]]\nshape = \"box\"\nsize_mm = [50, 24, 6]\ncenter_mm = [0, 0, -40]\n";
     let results = [MESH, by_sides].map(|body| evaluated(&place, &format!("{CORE}{body}")));
     let [mesh, sides] = results.each_ref().map(inductance_h);
-    let alone = inductance_h(&evaluated(&place, CORE));
+    let alone = inductance_h(&ALONE);
     assert!(
         (mesh / sides - 1.0).abs() < 1e-4 && mesh > 1.02 * alone,
         "{mesh} {sides} {alone}"
@@ -370,7 +381,10 @@ fn what_touches_cores_is_joined_to_them() {
     let bar = format!(
         "{CORE}[[iron]]\nshape = \"box\"\nsize_mm = [70, 40, 4]\ncenter_mm = [0, 0, -36]\n"
     );
-    let [plate, bar_alone] = [PLATE, &bar].map(|more| inductance_h(&evaluated(&place, more)));
+    let (plate, bar_alone) = (
+        inductance_h(&ON_PLATE),
+        inductance_h(&evaluated(&place, &bar)),
+    );
     assert!(
         (plate / bar_alone - 1.0).abs() < 1e-2,
         "{plate} {bar_alone}"
