@@ -377,7 +377,7 @@ fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
             "bench",
         ],
     ] {
-        stops(&place, args, &[300, 1300, 3700]);
+        stops(&place, args, &[300, 1900]);
     }
 }
 
