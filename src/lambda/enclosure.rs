@@ -26,7 +26,6 @@
 use fluxform_numerics::real::Real;
 
 use super::certificate::best_within_limits;
-use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::qr_reduction::{largest_entries, times_power};
 use super::solve::{Extent, solve_paths};
@@ -66,13 +65,7 @@ pub fn jnd_currents(
     if !solved.reliable() || problem.offset_n.is_some() || lambda_n_per_m <= 0.0 {
         return Ok(None);
     }
-    let path = Path::new(
-        problem,
-        reduced,
-        &solved.bounds,
-        &solved.limited,
-        solved.doubt,
-    );
+    let path = solved.path(problem);
     // Without offset e_0 has one piece.
     let rates = &solved.unlimited.pieces[0].x_rate;
     let unlimited = rates.iter().take(problem.coils()).enumerate();

@@ -138,7 +138,7 @@ impl Extent {
 pub(super) struct Solved {
     pub reduced: Reduced,
     model: Model,
-    pub bounds: Bounds,
+    bounds: Bounds,
     /// The bounds of `unlimited`.
     free_bounds: Bounds,
     pub limited: Trace,
@@ -147,7 +147,7 @@ pub(super) struct Solved {
     error: f64,
     flaw: f64,
     /// Share of `lambda^2 mean(h^2)` up to which e* may be off since weak parts are left out.
-    pub doubt: f64,
+    doubt: f64,
 }
 
 /// The path without the drivers' size.
@@ -225,6 +225,17 @@ impl Solved {
         }
     }
 
+    /// The limited path in SI units.
+    pub fn path(&self, problem: &ForceProblem) -> Path {
+        let Self {
+            reduced,
+            bounds,
+            limited,
+            ..
+        } = self;
+        Path::new(problem, reduced, bounds, limited, self.doubt)
+    }
+
     pub fn reliable(&self) -> bool {
         self.limited.complete && self.unlimited.complete && self.flaw <= FLAW
     }
@@ -286,13 +297,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;
     let (solved, rank, precision) = solve_paths(problem, &largest, Extent::Whole);
-    let mut path = Path::new(
-        problem,
-        &solved.reduced,
-        &solved.bounds,
-        &solved.limited,
-        solved.doubt,
-    );
+    let mut path = solved.path(problem);
     if rank < problem.coils() && solved.doubt == 0.0 {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
@@ -323,13 +328,7 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
         Criterion::Saturation => {
-            let path = Path::new(
-                problem,
-                &solved.reduced,
-                &solved.bounds,
-                &solved.limited,
-                solved.doubt,
-            );
+            let path = solved.path(problem);
             path.last_turn().or(linear.filter(|&lambda| lambda == 0.0))
         }
         Criterion::Maxmin => worst::largest(problem, &largest).map(|most| most.lambda_n_per_m),
@@ -352,13 +351,7 @@ pub fn relative_error(
     if status(&solved, &solved.comparison()) != Status::Solved {
         return Ok(None);
     }
-    let path = Path::new(
-        problem,
-        &solved.reduced,
-        &solved.bounds,
-        &solved.limited,
-        solved.doubt,
-    );
+    let path = solved.path(problem);
     let requested_n = lambda_n_per_m * problem.rms_height_m();
     Ok(Some(path.error_n2(lambda_n_per_m).sqrt() / requested_n))
 }
@@ -448,8 +441,12 @@ fn solve_strong(
         Extent::Whole => WEAK,
         Extent::ToJnd(_) => WEAK_FOR_JND,
     };
+    // The path over few points is straight as long as the force is exact.
+    if problem.points() < problem.coils() || problem.offset_n.is_some() {
+        return None;
+    }
     let strong = reduced.without_weak_parts(share)?;
-    if strong.rank == rank || problem.offset_n.is_some() {
+    if strong.rank == rank {
         return None;
     }
     let moved = strong.most_moved(problem);
@@ -626,13 +623,7 @@ mod tests {
                 let residuals = piece.residual.iter_mut().chain(&mut piece.residual_rate);
                 residuals.for_each(|residual| *residual = *residual * Num::of(share));
             }
-            let path = Path::new(
-                &problem,
-                &solved.reduced,
-                &solved.bounds,
-                &solved.limited,
-                solved.doubt,
-            );
+            let path = solved.path(&problem);
             let settings = Settings {
                 at_n_per_m: Some(1.0),
                 ..Settings::default()
