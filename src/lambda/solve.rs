@@ -450,14 +450,18 @@ fn solve_strong(
         return None;
     }
     let moved = strong.most_moved(problem);
+    let length = |v: &[Num]| Num::dot(v, v).sqrt();
+    let heights = strong.reduced.heights();
+    let (height, weak) = (length(heights), length(&heights[strong.rank..]));
+    // No path changes that.
+    if matches!(extent, Extent::Whole) && weak * weak > Num::of(SHOWN) * height * height {
+        return None;
+    }
     let free = Unlimited::new(problem, exact);
     let mut solved = Solved::with(problem, extent, strong.reduced, free);
-    let length = |v: &[Num]| Num::dot(v, v).sqrt();
-    let heights = solved.reduced.heights();
     // The change is largest at the first breakpoint; lambda_jnd lies on the last piece but that of rest.
     let pieces = &solved.limited.pieces;
     let start = |place: usize| pieces.get(place).map(|piece| piece.start);
-    let (height, weak) = (length(heights), length(&heights[strong.rank..]));
     let (change, most) = match extent {
         Extent::Whole => {
             let requested = start(1)? * height;
