@@ -68,9 +68,9 @@ const WORST_POINT: Law = Law {
     reduce: FEWER,
 };
 /// Of coils so near to each other, as seen from the object, that their forces nearly depend on each other, and
-/// of the paths that tell the error of the number of points (`time fluxform lambda`, 225 coils; 900 extrapolated).
+/// of the paths that tell the error of the number of points (`time fluxform lambda`, 225 and 900 coils).
 const PATHS_OF_CLOSE_COILS: Law = Law {
-    seconds: |points, coils| 7e-10 * points * coils.powi(2) + 1.3e-9 * coils.powi(4),
+    seconds: |points, coils| 7e-10 * points * coils.powi(2) + 3e-7 * coils.powi(3),
     reduce: "fewer points or coils, or coils further apart, take less",
     ..PATH
 };

@@ -17,8 +17,8 @@ use crate::progress::Progress;
 /// Points are lifted by this share of the lowest height: small enough for first order, and large
 /// beside what forces are rounded to.
 const LIFTED_BY: f64 = 1e-3;
-/// Of more points than twice this many every second, third and so on is taken: some of them,
-/// lifted and not, show a shift of all as well.
+/// Of more points than twice this many, and than twice the coils, every second, third and so on is
+/// taken: some of them, lifted and not, show a shift of all as well.
 const ENOUGH_POINTS: usize = 600;
 
 impl PosedProblem<'_> {
@@ -73,7 +73,8 @@ impl PosedProblem<'_> {
             return Ok(None);
         }
         let unwired = &self.unwired;
-        let every = (unwired.height_m.len() / ENOUGH_POINTS).max(1);
+        let enough = ENOUGH_POINTS.max(unwired.coils());
+        let every = (unwired.height_m.len() / enough).max(1);
         let here = some(unwired.forces_n_per_a, unwired.coils(), every);
         let mut lifted_m = some(&self.points.positions_m, 1, every);
         // Lifted only: the steel's solution was made for the points and above.
@@ -131,10 +132,5 @@ fn chosen_lambda(
     settings: &Settings,
 ) -> Result<Option<f64>, RunError> {
     let rewired = wiring.apply(problem);
-    let settings = Settings {
-        at_n_per_m: None,
-        ..*settings
-    };
-    let solution = lambda::solve(&rewired.problem(problem), &settings)?;
-    Ok(solution.chosen.map(|chosen| chosen.lambda_n_per_m))
+    Ok(lambda::constant(&rewired.problem(problem), settings)?)
 }

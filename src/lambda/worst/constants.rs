@@ -5,7 +5,7 @@
 //! allowed (Newton's method, which ends on the piece that decides). t_0 is a line without an offset;
 //! with one it is convex too, and below the chord between any two of its values.
 
-use super::doubles::{Doubles, Failure};
+use super::doubles::{Doubles, Failure, Optimum};
 use super::scaled::{Form, Limits, Scaled};
 use crate::problem::ForceProblem;
 use crate::qr_reduction::{largest_entries, times_power};
@@ -42,6 +42,16 @@ struct Line {
 }
 
 impl Line {
+    fn of(optimum: &Optimum) -> Self {
+        let piece = &optimum.piece;
+        let last = piece.z.len() - 1;
+        Self {
+            lambda: piece.start,
+            value: piece.z[last],
+            slope: piece.rate[last],
+        }
+    }
+
     fn at(&self, lambda: Num) -> Num {
         self.value + (lambda - self.lambda) * self.slope
     }
@@ -91,7 +101,7 @@ pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, 
     let mut lambda = Num::of(FAR);
     for _ in 0..LINES {
         fluxform_base::progress::poll();
-        let line = limited.at(lambda).ok()?.line();
+        let line = Line::of(&limited.at(lambda).ok()?);
         // A tangent of a convex function leads from above to where it is zero, or stays above.
         let step = line.value / line.slope;
         if line.value <= Num::of(ALMOST_NONE) * scaled.top() * lambda
@@ -124,11 +134,7 @@ struct Errors<'s, 'a> {
 impl Errors<'_, '_> {
     fn limited_line(&mut self, lambda: Num) -> Result<Line, Failure> {
         let optimum = self.limited.at(lambda)?;
-        let size = (lambda * self.top + self.without).to_f64();
-        if size > 0.0 {
-            self.doubt = self.doubt.max(optimum.doubt / size);
-        }
-        Ok(optimum.line())
+        Ok(self.line(&optimum))
     }
 
     fn free_line(&mut self, lambda: Num) -> Result<Line, Failure> {
@@ -139,7 +145,17 @@ impl Errors<'_, '_> {
                 slope: line.slope,
             });
         }
-        Ok(self.free.at(lambda)?.line())
+        let optimum = self.free.at(lambda)?;
+        Ok(self.line(&optimum))
+    }
+
+    fn line(&mut self, optimum: &Optimum) -> Line {
+        let line = Line::of(optimum);
+        let size = (line.lambda * self.top + self.without).to_f64();
+        if size > 0.0 {
+            self.doubt = self.doubt.max(optimum.doubt / size);
+        }
+        line
     }
 
     /// The rounding error of `t* - t_0` at `lambda`.
@@ -203,17 +219,6 @@ impl Errors<'_, '_> {
     }
 }
 
-impl super::doubles::Optimum {
-    fn line(&self) -> Line {
-        let last = self.piece.z.len() - 1;
-        Line {
-            lambda: self.piece.start,
-            value: self.piece.z[last],
-            slope: self.piece.rate[last],
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::scaled::Limits;
@@ -252,12 +257,16 @@ mod tests {
         let by_path = worst_point(&problem, &settings).unwrap();
         assert!(by_path.path.is_some() && by_path.complete);
         let largest = largest_entries(&problem);
-        let scaled = |limits| Scaled::new(&problem, &largest, Form::Worst, limits);
-        let (limited, free) = (scaled(Limits::All), scaled(Limits::Lower));
-        let alone = constants(&limited, &free, settings.jnd_weight)
-            .ok()
-            .unwrap();
-        let alone = super::super::without_path(&limited, &alone);
+        let without_path = |leeway| {
+            let [limited, free] = [Limits::All, Limits::Lower].map(|limits| {
+                let mut scaled = Scaled::new(&problem, &largest, Form::Worst, limits);
+                scaled.leeway = leeway;
+                scaled
+            });
+            let constants = constants(&limited, &free, settings.jnd_weight).ok();
+            super::super::without_path(&limited, &constants.unwrap())
+        };
+        let alone = without_path(0.0);
         let pairs = [
             (alone.lambda_linear_n_per_m, by_path.lambda_linear_n_per_m),
             (alone.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m),
@@ -269,5 +278,13 @@ mod tests {
         }
         let point = super::super::least_worst_error(&problem, alone.lambda_jnd_n_per_m.unwrap());
         assert!(point.gap_n < 1e-12 * point.worst_error_n, "{point:?}");
+        // A leeway moves t* by no more than it says.
+        let near = without_path(1e-6);
+        let stated = near.accuracy.estimate;
+        assert!((1e-6..1e-5).contains(&stated), "{stated}");
+        assert!((near.floor.unwrap() - by_path.floor.unwrap()).abs() < stated);
+        let (near, by_path) = (near.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m);
+        let off = near.unwrap() / by_path.unwrap() - 1.0;
+        assert!(off.abs() < 4.0 * stated / settings.jnd_weight, "{off}");
     }
 }

@@ -22,6 +22,8 @@ use fluxform_numerics::real::Real;
 
 /// Raise of the costs, relative to that of the minimised variable.
 const RAISE: f64 = 1e-7;
+/// The same where points may be missed by a share of the largest force: nothing takes it away again.
+const RAISE_WITH_LEEWAY: f64 = 1e-12;
 /// Multipliers that differ by less are equal, in units of the raise.
 const TIE: f64 = 0.01;
 /// Rounding of a force summed in doubles, in units of the terms' sizes.
@@ -44,6 +46,10 @@ const CHUNK: usize = 32;
 const TASK: usize = 128 * CHUNK;
 /// Exchanges per variable after which a program is given up.
 const PATIENCE: usize = 200;
+/// Multiplications after which all programs of one problem are given up: seconds.
+const WORK: usize = 20_000_000_000;
+/// The same where points may be missed by a share of the largest force: a minute.
+const WORK_WITH_LEEWAY: usize = 200_000_000_000;
 /// Turns from one method to the other.
 const TURNS: usize = 8;
 /// Corrections of a solution in double-double.
@@ -54,7 +60,7 @@ const CORRECTIONS: usize = 8;
 pub(super) enum Failure {
     /// No x satisfies the rows.
     Infeasible,
-    /// The limit of exchanges was met, or the rows depend on each other within rounding.
+    /// The limit of exchanges or of work was met, or the rows depend on each other within rounding.
     Stalled,
 }
 
@@ -83,6 +89,8 @@ pub(super) struct Doubles<'s, 'a> {
     inverse: Vec<f64>,
     /// Exchanges so far.
     exchanges: usize,
+    /// Multiplications that are left.
+    work: usize,
     random: Random,
 }
 
@@ -124,6 +132,11 @@ impl<'s, 'a> Doubles<'s, 'a> {
             matrix: Vec::new(),
             inverse: Vec::new(),
             exchanges: 0,
+            work: if scaled.leeway > 0.0 {
+                WORK_WITH_LEEWAY
+            } else {
+                WORK
+            },
             random: Random::new(1),
         }
     }
@@ -143,9 +156,14 @@ impl<'s, 'a> Doubles<'s, 'a> {
         if self.inverse.is_empty() {
             self.renew()?;
         }
-        let mut raise = RAISE;
+        let leeway = self.scaled.leeway > 0.0;
+        let mut raise = if leeway { RAISE_WITH_LEEWAY } else { RAISE };
         for _ in 0..TURNS {
             self.dual(lambda.to_f64(), raise, limit)?;
+            // What the raise has moved is in the doubt.
+            if leeway {
+                break;
+            }
             let moved = self.primal(lambda.to_f64(), limit)?;
             if !moved || !self.misses(lambda.to_f64()) {
                 break;
@@ -155,11 +173,13 @@ impl<'s, 'a> Doubles<'s, 'a> {
         Ok(self.finish(lambda))
     }
 
-    /// Rows below their bounds by less are met, in scaled units: what rounding leaves of forces.
+    /// Rows below their bounds by less are met, in scaled units: what rounding leaves of forces, and
+    /// the leeway.
     fn met(&self, lambda: f64, z: &[f64]) -> f64 {
         let [constant, slope] = self.program.size();
+        let requested = constant + lambda * slope;
         let pushed: f64 = z.iter().map(|x| 2.0 * x.abs()).sum();
-        ROUNDINGS * f64::EPSILON * (constant + lambda * slope + pushed) + 1e-25
+        ROUNDINGS * f64::EPSILON * (requested + pushed) + self.scaled.leeway * requested + 1e-25
     }
 
     fn bound(&self, row: usize, lambda: f64) -> f64 {
@@ -305,6 +325,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
         let patience = self.exchanges + 10 * self.width();
         while self.exchanges < limit.min(patience) {
             fluxform_base::progress::poll();
+            self.spend(2 * self.width() * (self.pool.count() + self.program.rows()))?;
             let multipliers = self.multipliers();
             let Some(leaving) = (0..self.width())
                 .filter(|&k| multipliers[k] < -NONE)
@@ -485,6 +506,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
         self.basis[k] = row;
         self.matrix[k * n..(k + 1) * n].copy_from_slice(coefficients);
         self.exchanges += 1;
+        self.spend(4 * n * n)?;
         if self.exchanges.is_multiple_of(FRESH) {
             return self.renew();
         }
@@ -498,6 +520,12 @@ impl<'s, 'a> Doubles<'s, 'a> {
             }
         }
         self.inverse[k * n..(k + 1) * n].copy_from_slice(&column);
+        Ok(())
+    }
+
+    fn spend(&mut self, multiplications: usize) -> Result<(), Failure> {
+        let left = self.work.checked_sub(multiplications);
+        self.work = left.ok_or(Failure::Stalled)?;
         Ok(())
     }
 

@@ -16,7 +16,8 @@
 //!
 //! The path is followed where that is little work. Of arrays whose path turns more often than that,
 //! or stands still at turns where symmetry lets many points decide at once, the constants alone are
-//! solved for, and the currents at any one lambda.
+//! solved for, and the currents at any one lambda; where even these are much work, up to a stated
+//! share of the largest force.
 //!
 //! Where several currents are equally good, a vertex is returned: of coils that cannot pull, the one
 //! with the least sum of currents.
@@ -52,7 +53,7 @@ use super::qr_reduction::{largest_entries, times_power};
 use constants::{Constants, constants};
 use constraint_generation::{Followed, Search};
 use criteria::Comparison;
-use doubles::{Doubles, Failure};
+use doubles::Doubles;
 use free::FreeProblem;
 use program::{End, Work};
 use scaled::{Form, Limits, Scaled};
@@ -60,6 +61,10 @@ use scaled::{Form, Limits, Scaled};
 /// Shares of lambda max h by which points may be missed where rounding leads a path astray that
 /// misses none; the estimated error states it.
 const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
+
+/// The same where the constants alone take too much work in doubles otherwise: coils side by side
+/// whose forces are nearly those of their neighbours.
+const LEEWAY_OF_CONSTANTS: f64 = 1e-6;
 
 /// Work that the path may take, both with the drivers' size and without.
 const WORK: Work = Work(10_000_000);
@@ -170,8 +175,12 @@ pub fn worst_point(
     if let Some(paths) = paths.as_ref().filter(|paths| paths.complete) {
         return Ok(read_off(problem, settings, &scaled, paths));
     }
-    if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
-        return Ok(without_path(&scaled, &constants));
+    for leeway in [0.0, LEEWAY_OF_CONSTANTS] {
+        scaled.leeway = leeway;
+        free.leeway = leeway;
+        if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
+            return Ok(without_path(&scaled, &constants));
+        }
     }
     let nothing = || Followed {
         pieces: Vec::new(),
@@ -237,7 +246,12 @@ fn without_path(scaled: &Scaled, constants: &Constants) -> WorstSolution {
         accuracy: StageAccuracy {
             estimate: constants.doubt,
             relative_to: "lambda max h".to_owned(),
-            method: "rounding of the forces of the points that are not in the program".to_owned(),
+            method: if scaled.leeway > 0.0 {
+                "share of the largest force by which points may be missed, and rounding"
+            } else {
+                "rounding of the forces of the points that are not in the program"
+            }
+            .to_owned(),
         },
     }
 }
@@ -282,15 +296,21 @@ impl WorstPoint {
 #[must_use]
 pub fn least_worst_error(problem: &ForceProblem, lambda_n_per_m: f64) -> WorstPoint {
     let largest = largest_entries(problem);
-    let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
-    let mut doubles = Doubles::new(&scaled, Form::Worst);
+    let mut scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
     let lambda = Num::of(times_power(lambda_n_per_m, -scaled.lambda_unit()));
-    let (currents_a, active) = match doubles.at(lambda) {
-        Ok(optimum) => (
-            scaled.currents_a(&optimum.piece.z),
-            path::active(doubles.rows(), &optimum.piece),
-        ),
-        Err(Failure::Infeasible | Failure::Stalled) => (vec![0.0; problem.coils()], Vec::new()),
-    };
-    WorstPoint::new(problem, lambda_n_per_m, currents_a, active)
+    for leeway in [0.0, LEEWAY_OF_CONSTANTS] {
+        scaled.leeway = leeway;
+        let mut doubles = Doubles::new(&scaled, Form::Worst);
+        if let Ok(optimum) = doubles.at(lambda) {
+            let currents_a = scaled.currents_a(&optimum.piece.z);
+            let active = path::active(doubles.rows(), &optimum.piece);
+            return WorstPoint::new(problem, lambda_n_per_m, currents_a, active);
+        }
+    }
+    WorstPoint::new(
+        problem,
+        lambda_n_per_m,
+        vec![0.0; problem.coils()],
+        Vec::new(),
+    )
 }
