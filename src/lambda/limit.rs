@@ -15,6 +15,8 @@
 //! Points that count alike give another limit than the object's, off by the first power of the
 //! spacing: their border counts twice. The difference from the same points by area is in the first one.
 
+use rayon::prelude::*;
+
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::solve::constant;
 
@@ -138,7 +140,7 @@ fn spacing_off(
     places: GridPlaces,
     areas: &[f64],
     (of_cells, fine): (f64, Option<FineSamples>),
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError>,
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError> + Sync,
 ) -> Result<Option<f64>, ProblemError> {
     let ways = (0..SUBSETS).map(|which| places.blocks(areas, which));
     let ways: Vec<(Vec<f64>, f64)> = ways.collect();
@@ -150,29 +152,31 @@ fn spacing_off(
             SPACING_TO_ERROR * of_cells * smooth / others
         }));
     }
-    let mut largest = 0.0_f64;
-    for (weights, share) in ways.iter().filter(|(_, share)| *share > 0.5 * most) {
-        let Some(off) = differs(weights, fine.map(|fine| fine.areas))? else {
-            return Ok(None);
-        };
-        largest = largest.max(off / share);
-    }
-    Ok(Some(largest))
+    let ways: Vec<_> = (ways.iter().filter(|(_, share)| *share > 0.5 * most)).collect();
+    largest(&ways, |(weights, share)| {
+        let off = differs(weights, fine.map(|fine| fine.areas))?;
+        Ok(off.map(|off| off / share))
+    })
 }
 
 /// The same where every fourth of points on no grid is taken.
 fn every_fourth_off(
     areas: &[f64],
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError>,
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError> + Sync,
 ) -> Result<Option<f64>, ProblemError> {
-    let mut largest = 0.0_f64;
-    for which in 0..SUBSETS {
-        let Some(off) = differs(&every_fourth(areas, which), None)? else {
-            return Ok(None);
-        };
-        largest = largest.max(off);
-    }
-    Ok(Some(largest))
+    let ways: Vec<usize> = (0..SUBSETS).collect();
+    largest(&ways, |&which| differs(&every_fourth(areas, which), None))
+}
+
+/// The largest value of `off` over all `ways`, which are looked at side by side; `None` where one has none.
+fn largest<T: Sync>(
+    ways: &[T],
+    off: impl Fn(&T) -> Result<Option<f64>, ProblemError> + Sync,
+) -> Result<Option<f64>, ProblemError> {
+    let found: Vec<_> = ways.par_iter().map(&off).collect();
+    found.into_iter().try_fold(Some(0.0_f64), |most, off| {
+        Ok(most.zip(off?).map(|(most, off)| most.max(off)))
+    })
 }
 
 fn every_fourth(areas: &[f64], which: usize) -> Vec<f64> {

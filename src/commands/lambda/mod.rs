@@ -466,8 +466,11 @@ impl PosedProblem<'_> {
         progress: &dyn Progress,
     ) -> Result<LambdaReport, RunError> {
         let (options, problem) = (self.options, &self.problem);
-        let mut solution = lambda::solve(problem, &options.settings)?;
-        let worst = worst_point(problem, &options.settings)?;
+        let (solution, worst) = rayon::join(
+            || lambda::solve(problem, &options.settings),
+            || worst_point(problem, &options.settings),
+        );
+        let (mut solution, worst) = (solution?, worst?);
         for point in solution.chosen.iter_mut().chain(&mut solution.at) {
             options.wiring.spread(&mut point.currents_a);
         }

@@ -96,9 +96,11 @@ impl PosedProblem<'_> {
             };
             chosen_lambda(&problem, &self.options.wiring, &self.options.settings)
         };
-        let (Some(here), Some(there)) =
-            (lambda(&here, &height_m)?, lambda(&there, &lifted_height_m)?)
-        else {
+        let (here, there) = rayon::join(
+            || lambda(&here, &height_m),
+            || lambda(&there, &lifted_height_m),
+        );
+        let (Some(here), Some(there)) = (here?, there?) else {
             return Ok(None);
         };
         if here <= 0.0 {
