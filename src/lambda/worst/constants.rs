@@ -18,6 +18,8 @@ const VISIBLE: f64 = 1e-12;
 const ALMOST_NONE: f64 = 1e-14;
 /// A scaled lambda above which no limit begins to bind: 1 is a force near the largest of one coil.
 const FAR: f64 = (1 << 20) as f64;
+/// A doubt beyond which doubles do not lead to the constants, without a leeway and with one.
+const MOST_DOUBT: [f64; 2] = [1e-6, 1e-2];
 /// More lines than lead to any constant.
 const LINES: usize = 200;
 
@@ -60,7 +62,7 @@ impl Line {
 /// Solves for the constants of `limited` against `free`, the same without the drivers' size.
 ///
 /// # Errors
-/// Where one of the programs has no solution in doubles.
+/// Where one of the programs has no solution in doubles, or only one in too much doubt.
 pub(super) fn constants(
     limited: &Scaled,
     free: &Scaled,
@@ -73,6 +75,7 @@ pub(super) fn constants(
         top: limited.top(),
         without: Num::ZERO,
         doubt: 0.0,
+        most_doubt: MOST_DOUBT[usize::from(limited.leeway > 0.0)],
     };
     if free.offset_n() == 0.0 {
         errors.proportional = Some(errors.free_line(Num::ONE)?);
@@ -129,12 +132,13 @@ struct Errors<'s, 'a> {
     /// t* without currents' need: at lambda = 0.
     without: Num,
     doubt: f64,
+    most_doubt: f64,
 }
 
 impl Errors<'_, '_> {
     fn limited_line(&mut self, lambda: Num) -> Result<Line, Failure> {
         let optimum = self.limited.at(lambda)?;
-        Ok(self.line(&optimum))
+        self.line(&optimum)
     }
 
     fn free_line(&mut self, lambda: Num) -> Result<Line, Failure> {
@@ -146,16 +150,20 @@ impl Errors<'_, '_> {
             });
         }
         let optimum = self.free.at(lambda)?;
-        Ok(self.line(&optimum))
+        self.line(&optimum)
     }
 
-    fn line(&mut self, optimum: &Optimum) -> Line {
+    /// The line at an optimum, unless it is in too much doubt.
+    fn line(&mut self, optimum: &Optimum) -> Result<Line, Failure> {
         let line = Line::of(optimum);
         let size = (line.lambda * self.top + self.without).to_f64();
         if size > 0.0 {
             self.doubt = self.doubt.max(optimum.doubt / size);
         }
-        line
+        if self.doubt > self.most_doubt {
+            return Err(Failure::Stalled);
+        }
+        Ok(line)
     }
 
     /// The rounding error of `t* - t_0` at `lambda`.

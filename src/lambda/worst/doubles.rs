@@ -23,7 +23,7 @@ use fluxform_numerics::real::Real;
 /// Raise of the costs, relative to that of the minimised variable.
 const RAISE: f64 = 1e-7;
 /// The same where points may be missed by a share of the largest force: nothing takes it away again.
-const RAISE_WITH_LEEWAY: f64 = 1e-12;
+const RAISE_WITH_LEEWAY: f64 = 1e-10;
 /// Multipliers that differ by less are equal, in units of the raise.
 const TIE: f64 = 0.01;
 /// Rounding of a force summed in doubles, in units of the terms' sizes.
@@ -47,8 +47,8 @@ const TASK: usize = 128 * CHUNK;
 /// Exchanges per variable after which a program is given up.
 const PATIENCE: usize = 200;
 /// Multiplications after which all programs of one problem are given up: seconds.
-const WORK: usize = 20_000_000_000;
-/// The same where points may be missed by a share of the largest force: a minute.
+const WORK: usize = 60_000_000_000;
+/// The same where points may be missed by a share of the largest force: a minute or two.
 const WORK_WITH_LEEWAY: usize = 200_000_000_000;
 /// Turns from one method to the other.
 const TURNS: usize = 8;
@@ -275,6 +275,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
                     z = self.place(lambda);
                     moved = false;
                 }
+                self.spend(n * (self.program.rows() + self.pool.count()))?;
                 violated = self.all_violated(lambda, &z);
                 violated.truncate(LOOKED_AT);
             }
