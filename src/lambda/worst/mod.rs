@@ -182,6 +182,7 @@ pub fn worst_point(
             return Ok(without_path(&scaled, &constants));
         }
     }
+    scaled.leeway = 0.0;
     let nothing = || Followed {
         pieces: Vec::new(),
         rows: Vec::new(),
