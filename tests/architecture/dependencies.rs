@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use crate::source::{read, root};
+use crate::source::{files, manifests, read, root};
 
 /// Packages without a maintainer, and the only ones that may need them.
 const UNMAINTAINED: [(&str, &[&str]); 1] = [("paste", &["argmin", "simba"])];
@@ -82,4 +82,44 @@ fn the_wheel_of_the_tests_is_built_on_what_they_compile() {
         again.is_empty(),
         "mend `tests` in src/python/Cargo.toml or the last dependencies of tests/support/Cargo.toml: {again:#?}"
     );
+}
+
+/// The workspace's tests, built together, have every feature of the shared parts: a room's alone have those it asks for.
+#[test]
+fn a_room_asks_for_the_shared_parts_that_its_tests_use() {
+    let library = read("tests/support/lib.rs");
+    let gated = library.split("#[cfg(feature = \"").skip(1).map(|after| {
+        let (feature, rest) = after.split_once("\")]\npub mod ").expect("a part");
+        (feature, rest.split(';').next().unwrap_or(""))
+    });
+    let gated: Vec<(&str, &str)> = gated.collect();
+    assert!(gated.contains(&("shape", "surfaces")), "{gated:?}");
+    for manifest in manifests() {
+        let room = manifest
+            .trim_start_matches("src/")
+            .trim_end_matches("/Cargo.toml");
+        let of_room = format!("tests/{room}/");
+        let asked = read(&manifest);
+        // The tests of some rooms are those of the whole program.
+        if !asked.contains(&format!("{of_room}main.rs")) {
+            continue;
+        }
+        let asked = asked
+            .lines()
+            .find(|line| line.starts_with("fluxform-testing"));
+        for test in files().iter().filter(|file| file.starts_with(&of_room)) {
+            let text = read(test);
+            let uses = text.split("fluxform_testing::").skip(1);
+            let uses = uses.filter_map(|after| after.split(';').next());
+            for (used, (feature, part)) in
+                uses.flat_map(|used| gated.iter().map(move |gate| (used, gate)))
+            {
+                assert!(
+                    !used.contains(&format!("{part}::"))
+                        || asked.is_some_and(|line| line.contains(&format!("\"{feature}\""))),
+                    "{test} uses what {manifest} does not ask for: {feature}"
+                );
+            }
+        }
+    }
 }

@@ -4,9 +4,10 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use fluxform_testing::boxes::block;
 use fluxform_testing::place::Place;
 use fluxform_testing::run::Ran;
-use fluxform_testing::surfaces::{binary, block};
+use fluxform_testing::surfaces::binary;
 
 /// Two short coils, and what else there is.
 fn design(place: &Place, more: &str) {

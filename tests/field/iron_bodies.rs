@@ -13,7 +13,7 @@ use fluxform_field::iron::face::{Face, Point};
 use fluxform_field::iron::mesh_body::MeshBody;
 use fluxform_field::iron::uniform::InUniformField;
 use fluxform_field::winding::Winding;
-use fluxform_testing::surfaces::block;
+use fluxform_testing::boxes::block;
 
 /// A direction that no symmetry helps.
 const ALONG: Point = [0.48, -0.6, 0.64];

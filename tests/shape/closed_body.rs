@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fluxform_shape::ShapeError;
 use fluxform_shape::closed_body::{BodyRequest, ClosedBodies};
-use fluxform_testing::surfaces::block;
+use fluxform_testing::boxes::block;
 
 type Triangle = [[f64; 3]; 3];
 

@@ -7,7 +7,8 @@ use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl;
 
-use fluxform_testing::surfaces::{binary, box_of, exact, grid, sample};
+use fluxform_testing::boxes::box_of;
+use fluxform_testing::surfaces::{binary, exact, grid, sample};
 use fluxform_testing::{Random, root};
 
 /// Height over an integer point by whole-number arithmetic: (numerator, denominator > 0).

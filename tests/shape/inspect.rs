@@ -4,7 +4,7 @@ use fluxform_shape::MeshReport;
 use fluxform_shape::document::SurfaceFormat;
 use fluxform_shape::file_mesh::{FileMesh, Triangle};
 
-use fluxform_testing::surfaces::block;
+use fluxform_testing::boxes::block;
 
 fn report(triangles: Vec<Triangle>) -> MeshReport {
     let file = FileMesh {

@@ -23,7 +23,8 @@ use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform_shape::scattered::poisson::poisson;
 use fluxform_shape::{Settings, Surface, discretize_with, stl};
 
-use fluxform_testing::surfaces::{block, exact, file, grid, lifted, sample, seed_grid};
+use fluxform_testing::boxes::block;
+use fluxform_testing::surfaces::{exact, file, grid, lifted, sample, seed_grid};
 use fluxform_testing::{Random, root};
 
 /// Patches as wide as the deviation allows.

@@ -2,6 +2,7 @@
 // A test's own files, folders and messages.
 #![allow(missing_docs, clippy::disallowed_methods, clippy::print_stderr)]
 
+pub mod boxes;
 #[cfg(feature = "bundle")]
 pub mod bundle;
 #[cfg(feature = "lambda")]
