@@ -68,7 +68,7 @@ fn resolution(tolerance: f64, positions_m: &[[f64; 2]]) -> ArrayResolution {
 }
 
 fn solve_at(
-    law: &(impl Permeability + Sync),
+    law: &dyn Permeability,
     positions_m: &[[f64; 2]],
     currents_a: &[f64],
     resolution: &ArrayResolution,
@@ -89,7 +89,7 @@ fn solve_at(
 }
 
 fn solve(
-    law: &(impl Permeability + Sync),
+    law: &dyn Permeability,
     positions_m: &[[f64; 2]],
     currents_a: &[f64],
     tolerance: f64,

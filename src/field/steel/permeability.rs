@@ -1,5 +1,7 @@
 //! The solvers' view of a material: an isotropic, single-valued B(H).
 
+use std::fmt::Debug;
+
 use super::bh_curve::BhCurve;
 use fluxform_base::units::MU_0_T_M_PER_A;
 
@@ -13,7 +15,7 @@ pub struct Response {
 }
 
 /// An isotropic material without memory. B must grow with H and be at least mu_0 H.
-pub trait Permeability {
+pub trait Permeability: Debug + Sync {
     /// The material's relative and differential permeability at `h_a_per_m` >= 0.
     fn response(&self, h_a_per_m: f64) -> Response;
 }

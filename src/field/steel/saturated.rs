@@ -156,7 +156,7 @@ impl SaturatedCore {
     pub fn solve(
         &self,
         phi_a: &DVector<f64>,
-        law: &impl Permeability,
+        law: &dyn Permeability,
         start: Option<&DVector<f64>>,
     ) -> Solution {
         assert_eq!(phi_a.len(), self.trace.gauss_count(), "one value a node");
@@ -222,7 +222,7 @@ impl SaturatedCore {
 
     /// |B| of a solution.
     #[must_use]
-    pub fn field(&self, solution: &Solution, law: &impl Permeability) -> CoreField {
+    pub fn field(&self, solution: &Solution, law: &dyn Permeability) -> CoreField {
         let b_t = |sample: Sample| {
             let h = sample.h_a_per_m();
             MU_0_T_M_PER_A * law.response(h).relative * h

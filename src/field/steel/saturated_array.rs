@@ -168,7 +168,7 @@ impl SaturatedArray {
     pub fn new(
         winding: &Winding,
         shape: CoreShape,
-        law: &(impl Permeability + Sync),
+        law: &dyn Permeability,
         positions_m: &[[f64; 2]],
         currents_a: &[f64],
         tolerance: f64,
@@ -219,7 +219,7 @@ impl SaturatedArray {
     pub fn at_resolution(
         winding: &Winding,
         shape: CoreShape,
-        law: &(impl Permeability + Sync),
+        law: &dyn Permeability,
         positions_m: &[[f64; 2]],
         currents_a: &[f64],
         reference_permeability: f64,
@@ -241,7 +241,7 @@ impl SaturatedArray {
     fn solve(
         winding: &Winding,
         setup: &Setup,
-        law: &(impl Permeability + Sync),
+        law: &dyn Permeability,
         positions_m: &[[f64; 2]],
         currents_a: &[f64],
         reference_permeability: f64,
@@ -327,7 +327,7 @@ impl SaturatedArray {
     }
 
     /// Smallest ratio of mean |B| to mean |H| of any core, over mu_0.
-    fn least_secant(&self, core: &SaturatedCore, law: &impl Permeability) -> f64 {
+    fn least_secant(&self, core: &SaturatedCore, law: &dyn Permeability) -> f64 {
         let interior = core.interior();
         self.state
             .cores
@@ -417,10 +417,10 @@ impl ArraySources {
 }
 
 /// One array at its currents, compared from a height up.
-struct Sequence<'a, L> {
+struct Sequence<'a> {
     winding: &'a Winding,
     shape: CoreShape,
-    law: &'a L,
+    law: &'a dyn Permeability,
     positions_m: &'a [[f64; 2]],
     currents_a: &'a [f64],
     /// Permeability of the modes that are not axisymmetric.
@@ -429,7 +429,7 @@ struct Sequence<'a, L> {
     lowest_m: f64,
 }
 
-impl<L: Permeability + Sync> Sequence<'_, L> {
+impl Sequence<'_> {
     /// How finely the finest solution of a try is cut, but for its outline.
     fn finest(&self, aim: f64) -> ArrayResolution {
         let offsets = Offsets::of_pairs(self.positions_m).count();
@@ -469,7 +469,7 @@ impl<L: Permeability + Sync> Sequence<'_, L> {
     }
 }
 
-impl<L: Permeability + Sync> AlongCurve for Sequence<'_, L> {
+impl AlongCurve for Sequence<'_> {
     type Solution = SaturatedArray;
     type Error = SaturatedArrayError;
 
@@ -528,7 +528,7 @@ struct Solved {
 }
 
 impl Problem<'_> {
-    fn iterate(&self, state: &mut State, law: &(impl Permeability + Sync)) -> Solved {
+    fn iterate(&self, state: &mut State, law: &dyn Permeability) -> Solved {
         let residual = self.setup.resolution.residual;
         let (rings, cores) = state.sent_a.shape();
         let scale = self.scale();
@@ -600,7 +600,7 @@ impl Problem<'_> {
     }
 
     /// Layers of mode 0 of all cores, under their own windings and the potentials sent.
-    fn cores(&self, state: &mut State, law: &(impl Permeability + Sync)) -> Vec<DVector<f64>> {
+    fn cores(&self, state: &mut State, law: &dyn Permeability) -> Vec<DVector<f64>> {
         let to_nodes = &self.response.exchange.to_nodes;
         let found: Vec<Option<Solution>> = (0..self.alike.len())
             .into_par_iter()

@@ -36,7 +36,7 @@ pub enum SaturatedCoilError {
 
 /// A coil whose core saturates.
 #[derive(Debug, Clone, Copy)]
-pub struct CoilWithCurve<'a, L> {
+pub struct CoilWithCurve<'a> {
     /// The winding.
     pub winding: &'a Winding,
     /// Its self inductance without the core, H.
@@ -44,7 +44,7 @@ pub struct CoilWithCurve<'a, L> {
     /// The core.
     pub shape: CoreShape,
     /// Its material.
-    pub law: &'a L,
+    pub law: &'a dyn Permeability,
 }
 
 /// The state of a coil with its core at one current.
@@ -65,7 +65,7 @@ pub struct SaturatedCoil {
     pub mean_error: f64,
 }
 
-impl<L: Permeability> CoilWithCurve<'_, L> {
+impl CoilWithCurve<'_> {
     /// Solves to an estimated error below `tolerance` from `lowest_m` up, or as far as the
     /// refinements carry: [`SaturatedCoil::relative_error`] states what was reached.
     ///
@@ -167,13 +167,13 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
 }
 
 /// A coil at one current, compared from a height up.
-struct AtCurrent<'a, L> {
-    coil: &'a CoilWithCurve<'a, L>,
+struct AtCurrent<'a> {
+    coil: &'a CoilWithCurve<'a>,
     current_a: f64,
     lowest_m: f64,
 }
 
-impl<L: Permeability> AlongCurve for AtCurrent<'_, L> {
+impl AlongCurve for AtCurrent<'_> {
     type Solution = SaturatedCoil;
     type Error = SaturatedCoilError;
 

@@ -272,7 +272,7 @@ impl Interior {
 
     /// Weak flux of mu grad u at every node, A m (see the module).
     #[must_use]
-    pub fn flux(&self, u: &DVector<f64>, law: &impl Permeability) -> DVector<f64> {
+    pub fn flux(&self, u: &DVector<f64>, law: &dyn Permeability) -> DVector<f64> {
         let mut flux = DVector::zeros(u.len());
         for index in 0..self.cell_count() {
             let cell = self.cell(index);
@@ -298,7 +298,7 @@ impl Interior {
     pub fn linearize(
         &self,
         u: &DVector<f64>,
-        law: &impl Permeability,
+        law: &dyn Permeability,
         secant: f64,
     ) -> Result<Condensed, NotPositive> {
         self.plan.condense(|index| {
@@ -371,7 +371,7 @@ impl Interior {
     /// in the energy norm int mu |grad u|^2, relative to u's own. It shows a mesh that is too
     /// coarse from one that is not; it is no bound.
     #[must_use]
-    pub fn resolution(&self, u: &DVector<f64>, law: &impl Permeability) -> f64 {
+    pub fn resolution(&self, u: &DVector<f64>, law: &dyn Permeability) -> f64 {
         let nodes = &self.reference.nodes;
         let Some(lower) = self.reference.degree.checked_sub(1).filter(|&d| d > 0) else {
             return 1.0;
@@ -461,7 +461,7 @@ impl Interior {
         cell: Cell,
         nodes: &[usize],
         u: &DVector<f64>,
-        law: &impl Permeability,
+        law: &dyn Permeability,
         secant: Option<f64>,
     ) -> Element {
         let Reference { values, slopes, .. } = &self.reference;

@@ -387,6 +387,7 @@ fn bad_curves() -> Vec<Case> {
 }
 
 /// Steel of mu_r = 1000 that stops at once at M = 1.3 T / mu_0: a kink in every core.
+#[derive(Debug)]
 struct Kinked;
 
 const FULL_A_PER_M: f64 = 1.3 / MU_0_T_M_PER_A;
@@ -408,7 +409,7 @@ impl Permeability for Kinked {
 }
 
 /// The steel's flux through the winding, Wb, along `law` at each current.
-fn fluxes(law: &impl Permeability, currents_a: &[f64]) -> Result<Vec<f64>, String> {
+fn fluxes(law: &dyn Permeability, currents_a: &[f64]) -> Result<Vec<f64>, String> {
     let resolution = Resolution::for_tolerance(1e-5);
     let outline = Generatrix::of_coil(&SEED, CORE, &resolution);
     let excitation = Excitation::new(&SEED, &outline, resolution.quadrature).map_err(reported)?;

@@ -26,7 +26,7 @@ pub(super) struct Change {
 
 impl SaturatedCore {
     /// v of a core whose permeability is that of the law at its own mean field.
-    pub(super) fn linear_start(&self, phi: &DVector<f64>, law: &impl Permeability) -> DVector<f64> {
+    pub(super) fn linear_start(&self, phi: &DVector<f64>, law: &dyn Permeability) -> DVector<f64> {
         let schur = self.interior.laplace_schur_m();
         let volume_m3 = self.interior.volume_m3();
         let solve = |chi: f64| {
@@ -61,7 +61,7 @@ impl SaturatedCore {
     pub(super) fn correction(
         &self,
         state: &State,
-        law: &impl Permeability,
+        law: &dyn Permeability,
         secant: f64,
     ) -> Option<(Change, f64)> {
         let tangent = self.interior.linearize(&state.u, law, secant).ok()?;
@@ -101,7 +101,7 @@ impl SaturatedCore {
         state: &State,
         change: &Change,
         length: f64,
-        law: &impl Permeability,
+        law: &dyn Permeability,
     ) -> State {
         let u = &state.u + &change.u * length;
         State {
@@ -118,7 +118,7 @@ impl SaturatedCore {
         state: &State,
         change: &Change,
         slope: f64,
-        law: &impl Permeability,
+        law: &dyn Permeability,
     ) -> (f64, State) {
         let (mut before, mut after) = ((0.0, slope), None);
         let mut length = 1.0;

@@ -242,6 +242,7 @@ fn any_current_converges() {
 }
 
 /// B that falls beyond a field: no material.
+#[derive(Debug)]
 struct Falling;
 
 impl Permeability for Falling {

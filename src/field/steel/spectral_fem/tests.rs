@@ -106,7 +106,7 @@ fn taylor_test_of_the_tangent() {
 }
 
 /// The tangent stiffness of all nodes, element by element.
-fn whole_tangent(mesh: &Interior, u: &DVector<f64>, law: &impl Permeability) -> DMatrix<f64> {
+fn whole_tangent(mesh: &Interior, u: &DVector<f64>, law: &dyn Permeability) -> DMatrix<f64> {
     let mut whole = DMatrix::zeros(u.len(), u.len());
     for index in 0..mesh.cell_count() {
         let cell = mesh.cell(index);
