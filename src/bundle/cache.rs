@@ -123,9 +123,13 @@ impl Store {
 
     /// Keeps `value` as entry `name`. What cannot be kept is computed again next time.
     pub fn keep<T: Serialize>(&self, name: &str, origin: &Origin, value: &T) {
-        let (Some((parent, folder)), Ok(bytes)) = (&self.place, postcard::to_stdvec(value)) else {
-            return;
-        };
+        if let (Some(place), Ok(bytes)) = (&self.place, postcard::to_stdvec(value)) {
+            Self::put(place, name, origin, &bytes);
+        }
+    }
+
+    /// Writes an entry that is in bytes; compiled once for all kinds of values.
+    fn put((parent, folder): &(PathBuf, &str), name: &str, origin: &Origin, bytes: &[u8]) {
         let Ok((dir, _made)) = atomic::open_made(parent, OsStr::new(folder)) else {
             return;
         };
@@ -138,8 +142,8 @@ impl Store {
         let _ = atomic::put(&dir, name, false, |out| {
             out.write_all(MAGIC)?;
             out.write_all(&origin.digest(&dir))?;
-            out.write_all(&Sha256::digest(&bytes))?;
-            out.write_all(&bytes)
+            out.write_all(&Sha256::digest(bytes))?;
+            out.write_all(bytes)
         });
     }
 

@@ -318,10 +318,14 @@ pub fn write_map_and(
     for beside in beside_paths {
         check_beside(beside.path, folder)?;
         let overwrite = overwrite_beside(beside.path, folder, overwrite.clone());
-        let written = set.write_under(beside.path, overwrite, |out| match beside.content {
-            BesideContent::VectorField(field) => write_vector_field(out, field),
-            BesideContent::Multipoles(model) => write_multipoles(out, model),
-        })?;
+        let written = set.write_under(
+            beside.path,
+            overwrite,
+            Box::new(|out| match beside.content {
+                BesideContent::VectorField(field) => write_vector_field(out, field),
+                BesideContent::Multipoles(model) => write_multipoles(out, model),
+            }),
+        )?;
         if let Some(name) = name_in(folder, beside.path) {
             sidecar.files.push(FileEntry::new(name, written));
         }

@@ -20,6 +20,9 @@ pub struct Written {
     pub sha256: String,
 }
 
+/// What writes a file's bytes. Boxed, so that what makes a file is compiled once and not for every content.
+pub(super) type Content<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
+
 /// Whether what is written must be on the disk before it counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Durability {
@@ -33,7 +36,7 @@ pub(super) enum Durability {
 pub(super) fn fill(
     file: &mut File,
     durability: Durability,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    content: Content,
 ) -> io::Result<Written> {
     let (bytes, sha256) = pour(file, durability, Some(Sha256::new()), content)?;
     Ok(Written {
@@ -43,10 +46,7 @@ pub(super) fn fill(
 }
 
 /// As [`fill`], for what carries a digest of its own.
-pub(super) fn fill_unhashed(
-    file: &mut File,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
+pub(super) fn fill_unhashed(file: &mut File, content: Content) -> io::Result<()> {
     pour(file, Durability::Cached, None, content).map(|_| ())
 }
 
@@ -54,7 +54,7 @@ fn pour(
     file: &mut File,
     durability: Durability,
     sha256: Option<Sha256>,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    content: Content,
 ) -> io::Result<(u64, Option<Sha256>)> {
     let mut buffered = BufWriter::with_capacity(
         BUFFER_BYTES,

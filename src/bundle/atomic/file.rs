@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::{Durability, Written, fill, fill_unhashed};
+use super::digest::{Content, Durability, Written, fill, fill_unhashed};
 use super::dir::{Dir, EntryStatus, Kind};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
@@ -30,7 +30,7 @@ pub fn write(
         return File::options()
             .write(true)
             .open(path)
-            .and_then(|mut device| fill(&mut device, Durability::Cached, content))
+            .and_then(|mut device| fill(&mut device, Durability::Cached, Box::new(content)))
             .map_err(|error| WriteError::from_io("write", path, error));
     }
     let mut set = FileSet::begin(parent_of(path), overwrite.clone());
@@ -67,7 +67,7 @@ pub(crate) fn put(
     }
     let mut made = new_temporary(dir, earlier)?;
     // Small: one call at the end forces it.
-    fill_unhashed(&mut made.file, content)?;
+    fill_unhashed(&mut made.file, Box::new(content))?;
     finish(&made, earlier)?;
     if forced {
         made.file.sync_all()?;
@@ -154,7 +154,7 @@ impl FileSet {
         target: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Written, WriteError> {
-        self.write_under(target, self.overwrite.clone(), content)
+        self.write_under(target, self.overwrite.clone(), Box::new(content))
     }
 
     /// As [`Self::write_at`], replaced under a policy of its own.
@@ -165,7 +165,7 @@ impl FileSet {
         &mut self,
         target: &Path,
         overwrite: Overwrite,
-        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+        content: Content,
     ) -> Result<Written, WriteError> {
         if target.file_name().is_none() {
             return Err(WriteError::IsFolder {

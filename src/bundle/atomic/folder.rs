@@ -130,7 +130,7 @@ impl FolderDraft {
                 dir = dir.child_or_new(part)?;
             }
             let mut file = dir.new_file(file, 0o666)?;
-            let written = fill(&mut file, Durability::Forced, content)?;
+            let written = fill(&mut file, Durability::Forced, Box::new(content))?;
             file.sync_all()?;
             Ok(written)
         };
