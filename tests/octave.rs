@@ -9,6 +9,7 @@ use std::process::{Command, ExitCode, Output};
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::Renderer;
+use rayon::prelude::*;
 
 use fluxform_testing::bundle::*;
 use fluxform_testing::{Random, needs, root, trials};
@@ -89,7 +90,7 @@ printf(format, found.');
 ";
 
 fn octave_and_rust_give_the_same_forces_heights_and_currents() {
-    for (name, tilted, pulled, samples) in [
+    let cases = [
         ("upright", false, false, [13, 17, 11]),
         ("tilted with pull", true, true, [13, 9, 11]),
         ("short axes", false, true, [2, 3, 1]),
@@ -102,7 +103,9 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
             true,
             [13, 9, 11],
         ),
-    ] {
+    ];
+    // Octave takes one core each.
+    cases.into_par_iter().for_each(|(name, tilted, pulled, samples)| {
         let folder = tempfile::tempdir().unwrap();
         let mut sample = sample(tilted, samples);
         if pulled {
@@ -191,7 +194,7 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
             "{name}: forces, pull, heights and currents differ by at most {worst} of the largest; \
              {answers:?} positions ok, saturated, outside"
         );
-    }
+    });
 }
 
 /// Octave's own functions are enough for the tables and the JSON files.

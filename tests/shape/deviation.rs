@@ -387,6 +387,7 @@ fn cells_say_where_the_surface_ends() {
 /// Quartering a rectangle does not part what lies over itself: it took hours.
 #[test]
 fn sheets_over_each_other_take_no_longer_than_the_highest() {
+    const SHEETS: usize = 20;
     let sheet = |z: [f64; 3]| {
         let [a, b, c] = [0, 1, 2].map(|k| z[k]);
         let corners = [[-1.0, -1.0, a], [2.0, -1.0, b], [-1.0, 2.0, c]];
@@ -400,14 +401,14 @@ fn sheets_over_each_other_take_no_longer_than_the_highest() {
     let below = |k: usize| 0.01 * k as f64 - 2.0;
     let stacks: [Vec<Triangle>; 4] = [
         // Level, steep, crossing each other, and one sheet many times.
-        (0..40).flat_map(|k| sheet([below(k); 3])).collect(),
-        (0..40)
+        (0..SHEETS).flat_map(|k| sheet([below(k); 3])).collect(),
+        (0..SHEETS)
             .flat_map(|k| sheet([-19.0, -10.0, -10.0].map(|z| z + below(k))))
             .collect(),
-        (0..40)
-            .flat_map(|k| sheet([below(k), below(40 - k), below(k * 7 % 40)]))
+        (0..SHEETS)
+            .flat_map(|k| sheet([below(k), below(SHEETS - k), below(k * 7 % SHEETS)]))
             .collect(),
-        (0..40).flat_map(|_| sheet([0.5; 3])).collect(),
+        (0..SHEETS).flat_map(|_| sheet([0.5; 3])).collect(),
     ];
     for (case, stack) in stacks.into_iter().enumerate() {
         let (found, apart) = certified(&exact([stack.clone(), ridge.clone()].concat()), &plan);
