@@ -121,7 +121,7 @@ fn unmet(limits: &Checks) -> Option<String> {
     let missed: Vec<String> = limits
         .iter()
         .filter(|(_, limit)| !limit.met)
-        .map(|(key, _)| words(key).0)
+        .map(|(key, _)| label(key))
         .collect();
     if limits.is_empty() {
         None
@@ -180,14 +180,14 @@ pub fn in_unit(value: f64, unit: &str) -> String {
 
 fn table(limits: &Checks) -> Table {
     let row = |(key, limit): (&&'static str, &LimitCheck)| -> Vec<Cell> {
-        let (name, unit) = words(key);
+        let (_, unit) = words(key);
         let verdict = if limit.met {
             "<span class=\"met\">met</span>"
         } else {
             "<span class=\"unmet\">not met</span>"
         };
         vec![
-            name.into(),
+            label(key).into(),
             in_unit(limit.value, unit).into(),
             in_unit(limit.limit, unit).into(),
             Cell::Markup(verdict.to_owned()),
@@ -252,5 +252,24 @@ fn currents(coils: &[DrivenCoil]) -> Table {
         ],
         rows: coils.iter().enumerate().map(row).collect(),
         prose: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The page called heat power, which the screen calls heat.
+    #[test]
+    fn regression_a_limit_has_one_name_on_page_and_screen() {
+        let missed = LimitCheck {
+            value: 31.0,
+            limit: 17.0,
+            met: false,
+        };
+        let limits = BTreeMap::from([("power_w", missed)]);
+        let text = unmet(&limits);
+        assert_eq!(text.as_deref(), Some("The coil misses its limit of heat."));
+        assert!(matches!(&table(&limits).rows[0][0], Cell::Text(name) if name == "heat"));
     }
 }
