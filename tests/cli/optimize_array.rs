@@ -151,7 +151,7 @@ fn heat_by_use_and_cost_are_limits() {
     place.run(&["calibrate", "best.toml", FLAT]).ends(0);
     let page = place.read("results/seed_air_array/flat/report.html");
     let page = String::from_utf8(page).expect("text");
-    assert!(page.contains("static power"));
+    assert!(page.contains("heat at static currents"));
     assert!(page.contains("Not looked at here: heat with feedback"));
     // What no array meets is named before or after it is computed.
     limited("array_cost_max = 150");
