@@ -13,6 +13,7 @@ use fluxform_field::iron::face::{Face, Point};
 use fluxform_field::iron::mesh_body::mesh;
 use fluxform_field::iron::uniform::InUniformField;
 use fluxform_field::winding::Winding;
+use fluxform_testing::boxes::block;
 
 const UP: Point = [0.0, 0.0, 1.0];
 const TERMS: usize = 400;
@@ -233,26 +234,7 @@ fn a_sphere_has_its_moment_at_any_permeability() {
 fn a_mesh_is_the_body_that_it_bounds() {
     let chi = 50.0;
     let faces = moment_m3(&[cuboid([1.0, 1.3, 0.8])], chi, 2);
-    let corner = |k: usize| -> Point {
-        [
-            0.5 * if k & 1 > 0 { 1.0 } else { -1.0 },
-            0.65 * if k & 2 > 0 { 1.0 } else { -1.0 },
-            0.4 * if k & 4 > 0 { 1.0 } else { -1.0 },
-        ]
-    };
-    let squares = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles: Vec<[Point; 3]> = squares
-        .iter()
-        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-        .map(|t| t.map(corner))
-        .collect();
+    let triangles = block([-0.5, -0.65, -0.4], [0.5, 0.65, 0.4]);
     // The diagonals alone are not sharp.
     let sharp = |number: usize, side: usize| {
         if number.is_multiple_of(2) {

@@ -204,24 +204,13 @@ pub(super) fn check(part: &mut Part) -> Result<Verdict, String> {
 
 #[cfg(test)]
 mod tests {
+    use fluxform_testing::boxes;
+
     use super::*;
 
     /// A block of these sides with a corner at `low`, counterclockwise from outside.
     fn block(low: [f64; 3], sides: [f64; 3]) -> Vec<Triangle> {
-        let corner = |bits: usize| -> [f64; 3] {
-            std::array::from_fn(|k| low[k] + sides[k] * f64::from((bits >> k & 1) as u8))
-        };
-        let faces = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
-        let halves = faces.into_iter().flat_map(halves);
-        halves.map(|names| names.map(corner)).collect()
+        boxes::block(low, std::array::from_fn(|k| low[k] + sides[k]))
     }
 
     fn part(triangles: Vec<Triangle>, area: f64, volume: f64) -> Part {
