@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::quadratic_program::minimise;
+use fluxform_base::progress::poll;
 
 /// A function to be maximised and its limits, at one place.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +72,31 @@ const FLAT: f64 = 1e-4;
 /// Share of the expected gain that a step must bring.
 const ENOUGH: f64 = 1e-3;
 
-/// The best place in `low..=high` near `start`; coordinates whose bounds are equal do not move.
+/// The best place in `low..=high` near `start`; coordinates whose bounds are equal do not move. A stop ends it
+/// between two steps.
+///
+/// ```
+/// use fluxform_base::progress::{interruptible, request_stop};
+/// use fluxform_numerics::mixed_search::descent::{Judged, climb};
+/// use std::cell::Cell;
+///
+/// let (calls, stop_at) = (Cell::new(0), Cell::new(usize::MAX));
+/// let of = |u: &[f64]| {
+///     calls.set(calls.get() + 1);
+///     if calls.get() == stop_at.get() {
+///         request_stop();
+///     }
+///     Judged {
+///         objectives: vec![-(u[0] - 0.3).powi(4)],
+///         limits: vec![u[0] - 0.8],
+///     }
+/// };
+/// let ended = interruptible(|| climb(&of, &[0.9], &[0.0], &[1.0])).unwrap();
+/// assert!((ended.u[0] - 0.3).abs() < 0.02);
+///
+/// stop_at.set(calls.replace(0) / 2);
+/// assert!(interruptible(|| climb(&of, &[0.9], &[0.0], &[1.0])).is_err());
+/// ```
 pub fn climb(of: &dyn Fn(&[f64]) -> Judged, start: &[f64], low: &[f64], high: &[f64]) -> Ended {
     let mut u: Vec<f64> = start
         .iter()
@@ -86,6 +111,7 @@ pub fn climb(of: &dyn Fn(&[f64]) -> Judged, start: &[f64], low: &[f64], high: &[
         if free.is_empty() || !judged.merit().is_finite() {
             break;
         }
+        poll();
         let slopes = Slopes::new(of, &u, &free, low, high);
         let room = |ends: &[f64]| -> Vec<f64> { free.iter().map(|&i| ends[i] - u[i]).collect() };
         let Some(step) = slopes.step(&judged, &curvature, (&room(low), &room(high))) else {
