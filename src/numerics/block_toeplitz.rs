@@ -35,7 +35,8 @@ impl BlockToeplitz {
     ) -> Self {
         let most = |axis: usize| cells.iter().map(|c| c[axis]).max().unwrap_or(0);
         let steps = [0, 1].map(most).map(|most| most as isize);
-        let plane = Plane::new(steps.map(|most| smooth(2 * most as usize + 1)));
+        let size = steps.map(|most| smooth(2 * most as usize + 1));
+        let plane = Plane::new(size, most(1) + 1);
         let all: Vec<[isize; 2]> = (-steps[1]..=steps[1])
             .flat_map(|y| (-steps[0]..=steps[0]).map(move |x| [x, y]))
             .collect();
@@ -64,8 +65,7 @@ impl BlockToeplitz {
                         let next = block.get((row, column + 1)).copied().unwrap_or(0.0);
                         values[*place] = Complex::new(block[(row, column)], next);
                     }
-                    plane.transform(&mut values, false);
-                    values
+                    plane.forward(values, plane.size[1])
                 })
                 .collect();
             spectrum.par_iter_mut().enumerate().for_each(|(k, block)| {
@@ -120,8 +120,7 @@ impl BlockToeplitz {
                     plane[*place] =
                         Complex::new(values[(cell * self.columns + channel, 2 * pair)], next);
                 }
-                self.plane.transform(&mut plane, false);
-                plane
+                self.plane.forward(plane, self.plane.rows)
             })
             .collect();
         // Several frequencies at a time: a plane is read by whole lines of the processor's cache.
@@ -144,8 +143,7 @@ impl BlockToeplitz {
                         plane[start + k] = *one;
                     }
                 }
-                self.plane.transform(&mut plane, true);
-                plane
+                self.plane.back(plane)
             })
             .collect();
         for (index, plane) in planes.iter().enumerate() {
@@ -208,15 +206,18 @@ impl BlockToeplitz {
 /// A periodic plane whose transform has the first axis last.
 struct Plane {
     size: [usize; 2],
+    /// Rows that hold cells; the others are there for steps across the end.
+    rows: usize,
     forward: [Arc<dyn Fft<f64>>; 2],
     inverse: [Arc<dyn Fft<f64>>; 2],
 }
 
 impl Plane {
-    fn new(size: [usize; 2]) -> Self {
+    fn new(size: [usize; 2], rows: usize) -> Self {
         let mut planner = FftPlanner::new();
         Self {
             size,
+            rows,
             forward: size.map(|n| planner.plan_fft_forward(n)),
             inverse: size.map(|n| planner.plan_fft_inverse(n)),
         }
@@ -243,24 +244,32 @@ impl Plane {
         (self.size[0] / 2 + 1) * self.size[1]
     }
 
-    /// From places to frequencies, or back, without the factor of the size.
-    fn transform(&self, values: &mut Vec<Complex<f64>>, back: bool) {
+    /// From places to frequencies; rows from `rows` on are zero.
+    fn forward(&self, mut values: Vec<Complex<f64>>, rows: usize) -> Vec<Complex<f64>> {
         let [nx, ny] = self.size;
-        let (first, second) = if back {
-            ([ny, nx], [1, 0])
-        } else {
-            ([nx, ny], [0, 1])
-        };
-        let plans = if back { &self.inverse } else { &self.forward };
-        plans[second[0]].process(values);
+        self.forward[0].process(&mut values[..rows * nx]);
         let mut turned = vec![Complex::default(); values.len()];
-        for (row, from) in values.chunks_exact(first[0]).enumerate() {
+        for (row, from) in values.chunks_exact(nx).take(rows).enumerate() {
             for (column, value) in from.iter().enumerate() {
-                turned[column * first[1] + row] = *value;
+                turned[column * ny + row] = *value;
             }
         }
-        plans[second[1]].process(&mut turned);
-        *values = turned;
+        self.forward[1].process(&mut turned);
+        turned
+    }
+
+    /// From frequencies to the rows that hold cells, without the factor of the size.
+    fn back(&self, mut values: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+        let [nx, ny] = self.size;
+        self.inverse[1].process(&mut values);
+        let mut turned = vec![Complex::default(); self.rows * nx];
+        for (column, from) in values.chunks_exact(ny).enumerate() {
+            for (row, value) in from.iter().take(self.rows).enumerate() {
+                turned[row * nx + column] = *value;
+            }
+        }
+        self.inverse[0].process(&mut turned);
+        turned
     }
 }
 

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::PoisonError;
 use std::time::Instant;
 
 use fluxform::commands::replay::Opened;
@@ -13,7 +14,7 @@ use fluxform_testing::{Random, root, trials};
 use crate::harness::Input;
 use crate::kinds::bundle::{hostile, mutate, seeds};
 
-use crate::{alone, another};
+use crate::{MEASURED, another};
 
 pub fn trials() -> Vec<Trial> {
     trials! {
@@ -52,7 +53,7 @@ fn ours(folder: &Path) -> bool {
 }
 
 fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
-    let _alone = alone();
+    let _unmeasured = MEASURED.read().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
     let program = c_loader(folder.path(), &["-g", SANITIZERS[0], SANITIZERS[1]]);
     let bundle = folder.path().join("bundle");
@@ -143,7 +144,7 @@ for folder in sys.stdin.read().splitlines():
 const BATCH: usize = 60;
 
 fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
-    let _alone = alone();
+    let _unmeasured = MEASURED.read().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(3);
     let mut corpus = corpus(&mut random);
@@ -225,7 +226,7 @@ end
 
 /// Octave starts slowly: all folders in one process, and few mutants.
 fn the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
-    let _alone = alone();
+    let _unmeasured = MEASURED.read().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(5);
     let must = hostile().len() + seeds().len();

@@ -11,7 +11,7 @@ mod structure;
 
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use fluxform_testing::needs::{self, Trial};
@@ -30,12 +30,9 @@ fn trials() -> Vec<Trial> {
     trials! { None => [every_kind_of_input_is_read_or_refused_within_its_limits] }
 }
 
-/// Memory is measured for the whole process: one test at a time.
-static ALONE: Mutex<()> = Mutex::new(());
-
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
-}
+/// Memory is measured for the whole process: while the readers' is, nothing else runs. The loaders read in
+/// processes of their own, one beside the other.
+pub(crate) static MEASURED: RwLock<()> = RwLock::new(());
 
 /// Mutants a kind of input or a loader is given: always the same ones.
 const MUTANTS: u64 = 60;
@@ -67,7 +64,7 @@ fn watch() {
 }
 
 fn every_kind_of_input_is_read_or_refused_within_its_limits() {
-    let _alone = alone();
+    let _alone = MEASURED.write().unwrap_or_else(PoisonError::into_inner);
     watch();
     std::panic::set_hook(Box::new(|_| {}));
     let folder = tempfile::tempdir().unwrap();
