@@ -13,7 +13,7 @@ mod run;
 mod snapshot;
 
 /// Every so many cases one: prime, so that all plants, names and flags have their turn.
-const EVERY: usize = 29;
+const EVERY: usize = 43;
 
 #[test]
 fn nothing_of_the_users_is_changed() {
