@@ -73,15 +73,35 @@ pub(super) fn largest_entries(problem: &ForceProblem) -> Vec<f64> {
         .collect()
 }
 
+/// The coils that count: all but those with neither force nor current, such as broken ones, unless that is all.
+pub(super) fn driven_coils(problem: &ForceProblem, largest: &[f64]) -> Vec<usize> {
+    let all = 0..problem.coils();
+    let counts = |&i: &usize| largest[i] > 0.0 || problem.reach_a(i) > 0.0;
+    let driven: Vec<usize> = all.clone().filter(counts).collect();
+    if driven.is_empty() {
+        return all.collect();
+    }
+    driven
+}
+
+/// The columns of those coils, of heights and offset, with the exponents of their largest values.
+fn driven_columns(problem: &ForceProblem, largest: &[f64]) -> Vec<(usize, i32)> {
+    let rest = problem.coils()..largest.len();
+    let all = driven_coils(problem, largest).into_iter().chain(rest);
+    all.map(|j| (j, exponent_of(largest[j]))).collect()
+}
+
 /// The triangular factor and the exponents of its columns' scales.
 #[derive(Debug, Clone)]
 pub(super) struct Reduced {
     /// R of `[G, h, -offset] / sqrt(n)`, or the matrix itself where points are fewer than coils; column i
-    /// divided by `2^scale[i]`.
+    /// divided by `2^scale[i]`. Coils that do not count have a column of zeros.
     columns: Vec<Vec<Num>>,
     /// Powers of two, of order of each column's root mean square.
     scale: Vec<i32>,
     coils: usize,
+    /// Coils that count.
+    driven: Vec<usize>,
     /// Exponent f of the unit of force.
     force_scale: i32,
     /// The same of lambda': `lambda = lambda' 2^lambda_scale`.
@@ -119,10 +139,10 @@ fn copy<T>(to: &mut [T], from: impl Iterator<Item = T>) {
     }
 }
 
-/// Rows `range` of `[G, h, -offset]`, column `j` over `2^exponents[j]`, written column by column.
+/// Rows `range` of the columns `which` of `[G, h, -offset]`, each over two to its exponent, written column by column.
 fn fill_rows<T: Real>(
     problem: &ForceProblem,
-    exponents: &[i32],
+    which: &[(usize, i32)],
     range: Range<usize>,
     block: &mut [T],
     stride: usize,
@@ -131,7 +151,7 @@ fn fill_rows<T: Real>(
     let rows = &problem.forces_n_per_a[range.start * coils..range.end * coils];
     // Two factors: the scale of a column of tiny entries alone would overflow.
     let factors = |k: i32| (power_of_two(-k / 2), power_of_two(-k - -k / 2));
-    for (j, (column, &k)) in block.chunks_exact_mut(stride).zip(exponents).enumerate() {
+    for (column, &(j, k)) in block.chunks_exact_mut(stride).zip(which) {
         let (a, b) = factors(k);
         let scaled = |v: &f64| T::of(v * a * b);
         match (j.checked_sub(coils), problem.offset_n) {
@@ -148,10 +168,10 @@ fn fill_rows<T: Real>(
 impl Reduced {
     /// By reflections of the points, whatever the columns.
     pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
-        let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let driven = driven_columns(problem, largest);
         let heaviest = T::of(problem.heaviest());
         let fill = |range: Range<usize>, block: &mut [T], stride: usize| {
-            fill_rows(problem, &exponents, range.clone(), block, stride);
+            fill_rows(problem, &driven, range.clone(), block, stride);
             let Some(weights) = problem.weights else {
                 return;
             };
@@ -161,14 +181,15 @@ impl Reduced {
                 }
             }
         };
-        let (points, width) = (problem.points(), largest.len());
+        let (points, width) = (problem.points(), driven.len());
+        let undriven = largest.len() - width;
         // Of fewer points than coils the rows themselves are the least that says everything.
-        let (rows, columns) = if points < problem.coils() {
+        let columns = if points + undriven < problem.coils() {
             let mut block = vec![T::ZERO; points * width];
             fill(0..points, &mut block, points);
-            (points, block)
+            block
         } else {
-            (width, triangular_factor(points, width, fill).into_columns())
+            triangular_factor(points, width, fill).into_columns()
         };
         let total = match problem.weights {
             None => Num::of(problem.points() as f64),
@@ -178,24 +199,18 @@ impl Reduced {
                 weights.iter().fold(Num::ZERO, sum)
             }
         };
-        Self::of_columns(
-            problem,
-            largest,
-            columns.chunks_exact(rows),
-            total,
-            T::EPSILON,
-        )
+        Self::of_columns(problem, driven, &columns, total, T::EPSILON)
     }
 
     /// By the products of the columns, in double-double: quicker, for coils' columns of this condition
     /// number. `None` where a column or the heights depend too nearly on others.
     pub fn by_products(problem: &ForceProblem, largest: &[f64], condition: f64) -> Option<Self> {
-        let exponents: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let driven = driven_columns(problem, largest);
         let unit = power_of_two(-exponent_of(problem.heaviest()));
         let triangle = triangular_factor_by_products(
             problem.points(),
-            largest.len(),
-            |range, block, stride| fill_rows(problem, &exponents, range, block, stride),
+            driven.len(),
+            |range, block, stride| fill_rows(problem, &driven, range, block, stride),
             |range, to| match problem.weights {
                 None => to.fill(1.0),
                 Some(weights) => copy(to, weights[range].iter().map(|&weight| weight * unit)),
@@ -210,32 +225,36 @@ impl Reduced {
         };
         let epsilon = Num::EPSILON * condition;
         let columns = triangle.into_columns();
-        let columns = columns.chunks_exact(largest.len());
-        Some(Self::of_columns(problem, largest, columns, total, epsilon))
+        Some(Self::of_columns(problem, driven, &columns, total, epsilon))
     }
 
-    /// From the columns that the scaled rows, whose weights add up to `total`, are turned to.
-    fn of_columns<'a, T: Real + 'a>(
+    /// From what the scaled columns of `driven` coils, heights and offset, whose weights add up to `total`, are turned
+    /// to, one after another.
+    fn of_columns<T: Real>(
         problem: &ForceProblem,
-        largest: &[f64],
-        turned: impl Iterator<Item = &'a [T]>,
+        driven: Vec<(usize, i32)>,
+        turned: &[T],
         total: Num,
         epsilon: f64,
     ) -> Self {
         let coils = problem.coils();
         let root = Num::ONE / total.sqrt();
-        let mut scale = Vec::with_capacity(largest.len());
-        let mut columns = Vec::with_capacity(largest.len());
-        for (&most, column) in largest.iter().zip(turned) {
+        let rows = turned.len() / driven.len();
+        let all = coils + 1 + usize::from(problem.offset_n.is_some());
+        let (mut scale, mut columns) = (vec![0; all], vec![vec![Num::ZERO; rows]; all]);
+        for (column, &(j, exponent)) in turned.chunks_exact(rows).zip(&driven) {
             let column: Vec<Num> = column.iter().map(|&v| v.widened() * root).collect();
             let more = exponent_of(Num::dot(&column, &column).sqrt().to_f64());
             let factor = Num::of(power_of_two(-more));
-            columns.push(column.into_iter().map(|v| v * factor).collect());
-            scale.push(exponent_of(most) + more);
+            columns[j] = column.into_iter().map(|v| v * factor).collect();
+            scale[j] = exponent + more;
         }
+        let driven: Vec<usize> = (driven.into_iter().map(|(j, _)| j))
+            .filter(|&j| j < coils)
+            .collect();
         let reach = |i: usize| problem.reach_a(i);
-        let force_scale = (0..coils)
-            .filter(|&i| reach(i) > 0.0 && largest[i] > 0.0)
+        let force_scale = (driven.iter().copied())
+            .filter(|&i| reach(i) > 0.0 && columns[i].iter().any(|&v| v != Num::ZERO))
             .map(|i| exponent_of(reach(i)) + scale[i])
             .max()
             .unwrap_or(0);
@@ -244,6 +263,7 @@ impl Reduced {
             columns,
             scale,
             coils,
+            driven,
             force_scale,
             lambda_scale,
             epsilon,
@@ -262,14 +282,19 @@ impl Reduced {
         Model::new(self.rows(), columns, weight, self.epsilon)
     }
 
-    /// Condition number of the coils' columns in the Frobenius norm, each scaled to unit
-    /// length; infinite where they depend on each other.
+    /// Number of coils that count.
+    pub fn driven(&self) -> usize {
+        self.driven.len()
+    }
+
+    /// Condition number in the Frobenius norm of the driven coils' columns, each scaled to unit length; infinite
+    /// where they depend on each other.
     pub fn condition(&self) -> f64 {
-        let n = self.coils;
-        let units: Vec<Vec<f64>> = self.columns[..n]
-            .iter()
+        let n = self.driven();
+        let units: Vec<Vec<f64>> = (self.driven.iter())
             .enumerate()
-            .map(|(j, column)| {
+            .map(|(j, coil)| {
+                let column = &self.columns[*coil];
                 let norm = Num::dot(column, column).sqrt();
                 column[..=j].iter().map(|&v| (v / norm).to_f64()).collect()
             })
@@ -339,10 +364,10 @@ impl Reduced {
         Some(self.cut(columns, rank, moved))
     }
 
-    /// `None` where all coils' columns are independent.
+    /// `None` where the columns of all driven coils are independent.
     fn pivoted(&self, share: f64) -> Option<Pivoted> {
         let pivoted = Pivoted::new(self.columns.clone(), self.coils, share);
-        (pivoted.members.len() < self.coils).then_some(pivoted)
+        (pivoted.members.len() < self.driven()).then_some(pivoted)
     }
 
     /// Turned columns, those of coils without anything below `rank`, with the fewest rows: one below it is enough for
@@ -488,6 +513,7 @@ mod tests {
                     ],
                     scale: vec![0; 3],
                     coils: 3,
+                    driven: vec![0, 1, 2],
                     force_scale: 0,
                     lambda_scale: 0,
                     epsilon: Num::EPSILON,

@@ -15,7 +15,7 @@ use super::homotopy::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
-use super::qr_reduction::{Reduced, largest_entries, times_power};
+use super::qr_reduction::{Reduced, driven_coils, largest_entries, times_power};
 use super::rest;
 use super::worst;
 
@@ -298,7 +298,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     problem.comparable(&largest)?;
     let (solved, rank, precision) = solve_paths(problem, &largest, Extent::Whole);
     let mut path = solved.path(problem);
-    if rank < problem.coils() && solved.doubt == 0.0 {
+    if rank < solved.reduced.driven() && solved.doubt == 0.0 {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
     let finish = match precision {
@@ -323,7 +323,7 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     if status(&solved, &comparison) == Status::NothingRendered {
         return Ok(None);
     }
-    let (linear, jnd) = first_and_jnd(problem, settings, &solved, &comparison, rank);
+    let (linear, jnd) = first_and_jnd(settings, &solved, &comparison, rank);
     Ok(match settings.criterion {
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
@@ -362,23 +362,23 @@ pub(super) fn solve_paths(
     largest: &[f64],
     extent: Extent,
 ) -> (Solved, usize, Precision) {
-    let coils = problem.coils();
+    let driven = driven_coils(problem, largest);
     let mut condition = None;
-    if problem.points() >= coils && !largest[..coils].contains(&0.0) {
+    if problem.points() >= driven.len() && driven.iter().all(|&coil| largest[coil] > 0.0) {
         let reduced = Reduced::new::<f64>(problem, largest);
         let plain = reduced.condition();
         condition = Some(plain).filter(|&condition| condition <= INDEPENDENT);
         if plain <= PLAIN_CONDITION
             && let Some(solved) = solve_plainly(problem, extent, reduced)
         {
-            return (solved, coils, Precision::Double);
+            return (solved, driven.len(), Precision::Double);
         }
     }
     let reduced = condition
         .and_then(|condition| Reduced::by_products(problem, largest, condition))
         .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
     let (solved, rank) = match condition {
-        Some(_) => (Solved::new(problem, extent, reduced), coils),
+        Some(_) => (Solved::new(problem, extent, reduced), driven.len()),
         None => solve_dependent(problem, extent, reduced),
     };
     (solved, rank, Precision::DoubleDouble)
@@ -400,7 +400,7 @@ fn solve_dependent(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> 
     let clean = reduced.with_clean_dependences();
     let exact = match &clean {
         Some(clean) => (&clean.reduced, clean.rank),
-        None => (&reduced, problem.coils()),
+        None => (&reduced, reduced.driven()),
     };
     if let Some(solved) = solve_strong(problem, extent, &reduced, exact) {
         return (solved, exact.1);
@@ -442,7 +442,7 @@ fn solve_strong(
         Extent::ToJnd(_) => WEAK_FOR_JND,
     };
     // The path over few points is straight as long as the force is exact.
-    if problem.points() < problem.coils() || problem.offset_n.is_some() {
+    if problem.points() < reduced.driven() || problem.offset_n.is_some() {
         return None;
     }
     let strong = reduced.without_weak_parts(share)?;
@@ -483,7 +483,6 @@ fn solve_strong(
 
 /// lambda_linear and lambda_jnd, N/m, off the two paths; null where no height is above zero.
 fn first_and_jnd(
-    problem: &ForceProblem,
     settings: &Settings,
     solved: &Solved,
     comparison: &Comparison<'_>,
@@ -491,7 +490,7 @@ fn first_and_jnd(
 ) -> (Option<f64>, Option<f64>) {
     let linear = if comparison.mean_square <= Num::ZERO {
         None
-    } else if rank == problem.coils() {
+    } else if rank == solved.reduced.driven() {
         comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
     } else {
         comparison.linear_by_error()
@@ -533,7 +532,7 @@ fn finish<T: Real>(
     precision: Precision,
 ) -> Solution {
     let comparison = solved.comparison();
-    let (linear, jnd) = first_and_jnd(problem, settings, solved, &comparison, rank);
+    let (linear, jnd) = first_and_jnd(settings, solved, &comparison, rank);
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
     let status = status(solved, &comparison);
     let lowest = problem

@@ -42,8 +42,14 @@ const STRIDE: usize = 1024;
 /// A side of a cell, from a node to the next along x (`false`) or y (`true`).
 type Side = (usize, bool);
 
-/// Height of the surface over a place, m.
-pub type HeightAt<'a> = &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync);
+/// The surface over a place.
+#[derive(Clone, Copy)]
+pub struct Over<'a> {
+    /// Its height, m.
+    pub height_m: &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync),
+    /// Whether it has one: that is sooner known.
+    pub covers: &'a (dyn Fn([f64; 2]) -> bool + Sync),
+}
 
 /// Cells of a grid whose corners describe the surface badly, sampled on finer places; columns of equal
 /// length.
@@ -70,23 +76,23 @@ pub struct FineCells {
 }
 
 /// The area of every grid point, m^2, x fastest; 0 where `heights_m` has none. Along an axis of one
-/// sample, its width is taken as 1 m. `height_at` is the surface between the points.
+/// sample, its width is taken as 1 m. `surface` is that between the points.
 ///
 /// # Errors
 /// [`Interrupted`] when the user asked to stop.
 pub fn areas_m2(
     grid: &Grid,
     heights_m: &[Option<f64>],
-    height_at: HeightAt,
+    surface: Over,
     progress: &dyn Progress,
 ) -> Result<(Vec<f64>, FineCells), Interrupted> {
     let mut areas = vec![0.0; heights_m.len()];
-    let broken = broken_cells(grid, heights_m, height_at, progress)?;
+    let broken = broken_cells(grid, heights_m, surface, progress)?;
     let mut fine = FineCells::default();
     if !broken.is_empty() {
         fine.smooth = vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)];
         fine.point_area_m2 = vec![0.0; heights_m.len()];
-        for (cell, samples) in sampled(grid, &broken, height_at, progress)? {
+        for (cell, samples) in sampled(grid, &broken, surface, progress)? {
             fine.smooth[cell] = samples.is_empty();
             for (part, [area_m2, coarse_area_m2]) in samples {
                 fine.x_m.push(part.at_m[0]);
@@ -97,7 +103,7 @@ pub fn areas_m2(
             }
         }
     }
-    let shares = Shares::new(grid, heights_m, height_at, progress)?;
+    let shares = Shares::new(grid, heights_m, surface, progress)?;
     shares.each(|cell, points, shares| {
         for (point, share) in points.iter().zip(shares) {
             areas[*point] += share;
@@ -117,7 +123,7 @@ type CellSamples = Vec<(Part, [f64; 2])>;
 fn sampled(
     grid: &Grid,
     broken: &[usize],
-    height_at: HeightAt,
+    surface: Over,
     progress: &dyn Progress,
 ) -> Result<Vec<(usize, CellSamples)>, Interrupted> {
     for depth in DEPTHS.rev() {
@@ -131,7 +137,7 @@ fn sampled(
         let of_cell = |cell: &usize| {
             fluxform_base::progress::poll();
             (so_far.load(Relaxed) <= most).then(|| {
-                let samples = cell_samples(grid, *cell, depth, height_at);
+                let samples = cell_samples(grid, *cell, depth, surface);
                 so_far.fetch_add(samples.len(), Relaxed);
                 (*cell, samples)
             })
@@ -147,7 +153,7 @@ fn sampled(
 
 /// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
 /// from their corners; none where none has surface.
-fn cell_samples(grid: &Grid, cell: usize, depth: u32, height_at: HeightAt) -> CellSamples {
+fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> CellSamples {
     let across = grid.x_m.samples - 1;
     let part = |axis: Axis, node: usize| Axis {
         from: axis.node(node),
@@ -158,8 +164,9 @@ fn cell_samples(grid: &Grid, cell: usize, depth: u32, height_at: HeightAt) -> Ce
         whole: depth,
         x_m: part(grid.x_m, cell % across),
         y_m: part(grid.y_m, cell / across),
-        height_at,
+        surface,
         heights_m: BTreeMap::new(),
+        ends: BTreeMap::new(),
         fine: Vec::new(),
         coarse: Vec::new(),
     };
@@ -214,8 +221,10 @@ struct Quarters<'a> {
     /// The nodes of the finest division.
     x_m: Axis,
     y_m: Axis,
-    height_at: HeightAt<'a>,
+    surface: Over<'a>,
     heights_m: BTreeMap<Node, Option<f64>>,
+    /// How far the surface goes from a node to the next of a part: two parts have that side.
+    ends: BTreeMap<[Node; 2], f64>,
     /// Parts that are not quartered again.
     fine: Vec<Part>,
     /// The same without the last quartering of each.
@@ -228,7 +237,7 @@ impl Quarters<'_> {
     }
 
     fn height_m(&mut self, node: Node) -> Option<f64> {
-        let (place, at) = (self.place(node), self.height_at);
+        let (place, at) = (self.place(node), self.surface.height_m);
         *self.heights_m.entry(node).or_insert_with(|| at(place))
     }
 
@@ -280,24 +289,22 @@ impl Quarters<'_> {
     }
 
     /// The piece of a part that has surface, with its middle; `None` without any.
-    fn part(&self, corners: [Node; 4], heights_m: [Option<f64>; 4]) -> Option<Part> {
-        let corners = corners.map(|corner| self.place(corner));
+    fn part(&mut self, nodes: [Node; 4], heights_m: [Option<f64>; 4]) -> Option<Part> {
+        let corners = nodes.map(|node| self.place(node));
         let mut outline = Vec::with_capacity(8);
         for k in 0..4 {
-            let (next, here) = ((k + 1) % 4, corners[k]);
+            let next = (k + 1) % 4;
             let present = [heights_m[k].is_some(), heights_m[next].is_some()];
             if present[0] {
-                outline.push(here);
+                outline.push(corners[k]);
             }
             if present[0] != present[1] {
-                let (from, to) = if present[0] {
-                    (here, corners[next])
-                } else {
-                    (corners[next], here)
-                };
-                let covered = |p: [f64; 2]| (self.height_at)(p).is_some();
-                let part = covered_part(from, to, &covered, PART_BISECTIONS);
-                outline.push(along(from, to, part));
+                let [has, lacks] = if present[0] { [k, next] } else { [next, k] };
+                let (from, to) = (corners[has], corners[lacks]);
+                let covers = self.surface.covers;
+                let end = self.ends.entry([nodes[has], nodes[lacks]]);
+                let part = end.or_insert_with(|| covered_part(from, to, covers, PART_BISECTIONS));
+                outline.push(along(from, to, *part));
             }
         }
         let (area_m2, middle) = area_and_middle(&outline)?;
@@ -306,7 +313,7 @@ impl Quarters<'_> {
             present.find_map(|(corner, height_m)| Some((corner, height_m?)))
         };
         // A bay of the silhouette may hold the middle.
-        let found = (self.height_at)(middle).map(|height_m| (middle, height_m));
+        let found = (self.surface.height_m)(middle).map(|height_m| (middle, height_m));
         let (at_m, height_m) = found.or_else(at_corner)?;
         Some(Part {
             at_m,
@@ -373,7 +380,7 @@ impl<'a> Shares<'a> {
     fn new(
         grid: &'a Grid,
         heights_m: &[Option<f64>],
-        height_at: HeightAt,
+        surface: Over,
         progress: &dyn Progress,
     ) -> Result<Self, Interrupted> {
         let present: Vec<bool> = heights_m.iter().map(Option::is_some).collect();
@@ -382,7 +389,7 @@ impl<'a> Shares<'a> {
             more => (axis.to - axis.from) / (more - 1) as f64,
         };
         Ok(Self {
-            ends: ends(grid, &present, &|p| height_at(p).is_some(), progress)?,
+            ends: ends(grid, &present, surface.covers, progress)?,
             grid,
             present,
             cell_m2: step(grid.x_m) * step(grid.y_m),
@@ -442,7 +449,7 @@ impl<'a> Shares<'a> {
 fn broken_cells(
     grid: &Grid,
     heights_m: &[Option<f64>],
-    height_at: HeightAt,
+    surface: Over,
     progress: &dyn Progress,
 ) -> Result<Vec<usize>, Interrupted> {
     let [columns, rows] = [grid.x_m.samples, grid.y_m.samples];
@@ -457,7 +464,7 @@ fn broken_cells(
                 let mean = 0.25 * known.iter().flatten().sum::<f64>();
                 let middle = [(grid.x_m, cell % across), (grid.y_m, cell / across)]
                     .map(|(axis, node)| 0.5 * (axis.node(node) + axis.node(node + 1)));
-                height_at(middle).map_or(0.0, |height| ((height - mean) / mean).abs())
+                (surface.height_m)(middle).map_or(0.0, |height| ((height - mean) / mean).abs())
             }
             _ => f64::INFINITY,
         }
@@ -580,7 +587,11 @@ mod tests {
         let heights: Vec<Option<f64>> = (0..grid.len())
             .map(|k| height_at([grid.x_m.node(k % columns), grid.y_m.node(k / columns)]))
             .collect();
-        areas_m2(grid, &heights, &height_at, &Silent).unwrap()
+        let surface = Over {
+            height_m: &height_at,
+            covers: &|p| height_at(p).is_some(),
+        };
+        areas_m2(grid, &heights, surface, &Silent).unwrap()
     }
 
     fn areas(grid: &Grid, covered: impl Fn([f64; 2]) -> bool + Sync) -> Vec<f64> {

@@ -83,7 +83,7 @@ pub(super) fn at(
     p: [f64; 2],
     rules: Rules,
 ) -> Option<(Sample, Marks)> {
-    let contacts = contacts(triangles, touching, p, rules);
+    let contacts: Vec<_> = contacts(triangles, touching, p, rules).collect();
     let sample = sample_of(triangles, &contacts)?;
     Some((sample, of_contacts(triangles, &contacts, p, &sample, rules)))
 }
@@ -95,27 +95,28 @@ pub(super) fn sample_at(
     p: [f64; 2],
     rules: Rules,
 ) -> Option<Sample> {
-    sample_of(triangles, &contacts(triangles, touching, p, rules))
+    let contacts: Vec<_> = contacts(triangles, touching, p, rules).collect();
+    sample_of(triangles, &contacts)
+}
+
+/// Whether [`sample_at`] has one: a single contact will do.
+pub(super) fn is_met(triangles: &[Triangle], touching: &[u32], p: [f64; 2], rules: Rules) -> bool {
+    contacts(triangles, touching, p, rules).next().is_some()
 }
 
 fn contacts(
     triangles: &[Triangle],
     touching: &[u32],
     p: [f64; 2],
-    rules: Rules,
-) -> Vec<(u32, Contact)> {
-    let mut contacts = Vec::new();
-    for &index in touching {
+    Rules { reach_m, .. }: Rules,
+) -> impl Iterator<Item = (u32, Contact)> {
+    let of = move |&index: &u32| {
         let triangle = &triangles[index as usize];
-        if !may_touch(triangle, p, rules.reach_m) {
-            continue;
-        }
-        match Seen::new(triangle, rules.reach_m).contact(p) {
-            Contact::None => {}
-            contact => contacts.push((index, contact)),
-        }
-    }
-    contacts
+        let contact =
+            may_touch(triangle, p, reach_m).then(|| Seen::new(triangle, reach_m).contact(p))?;
+        (contact != Contact::None).then_some((index, contact))
+    };
+    touching.iter().filter_map(of)
 }
 
 fn of_contacts(

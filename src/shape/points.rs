@@ -12,7 +12,7 @@ use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
 use crate::mesh::MeshFacts;
-use crate::point_areas::{FineCells, areas_m2};
+use crate::point_areas::{FineCells, Over, areas_m2};
 use crate::point_flags::Marks;
 use crate::scattered::Probe;
 use crate::surface::Surface;
@@ -453,7 +453,11 @@ fn point_areas_m2(
         heights_m[place] = Some(height_m);
     }
     let height_at = |p: [f64; 2]| Some(probe.sample(p)?.height_m.max(0.0));
-    let (all, mut fine) = areas_m2(&points.grid, &heights_m, &height_at, progress)?;
+    let surface = Over {
+        height_m: &height_at,
+        covers: &|p| probe.covers(p),
+    };
+    let (all, mut fine) = areas_m2(&points.grid, &heights_m, surface, progress)?;
     let of_points = |all: &[f64]| points.grid_index.iter().map(|&place| all[place]).collect();
     if !fine.smooth.is_empty() {
         fine.point_area_m2 = of_points(&fine.point_area_m2);

@@ -134,6 +134,17 @@ impl<'a> Probe<'a> {
         }
     }
 
+    /// Whether there is surface over a point: as [`Self::sample`] has it.
+    #[must_use]
+    pub fn covers(&self, p: [f64; 2]) -> bool {
+        match &self.kind {
+            Kind::Mesh {
+                mesh, index, rules, ..
+            } => point_flags::is_met(mesh.triangles(), index.at(p), p, *rules),
+            Kind::Primitive(primitive) => primitive.sample(p[0], p[1]).is_some(),
+        }
+    }
+
     /// How many triangles a look at a point compares it with.
     pub(super) fn near(&self, p: [f64; 2]) -> usize {
         match &self.kind {

@@ -11,7 +11,7 @@ use fluxform::numerics::axis::Axis;
 use fluxform::numerics::random::Random;
 use fluxform::progress::Silent;
 use fluxform::shape::height::Grid;
-use fluxform::shape::point_areas::{FineCells, areas_m2};
+use fluxform::shape::point_areas::{FineCells, Over, areas_m2};
 
 /// Finer along each axis for the limit.
 const FINER: usize = 8;
@@ -135,7 +135,11 @@ fn sampled(object: &Object, array: &Array, samples: usize) -> Sampled {
     let heights: Vec<Option<f64>> = (0..samples * samples)
         .map(|k| object.height_m(place(k)))
         .collect();
-    let (areas, mut fine) = areas_m2(&grid, &heights, &|p| object.height_m(p), &Silent).unwrap();
+    let surface = Over {
+        height_m: &|p| object.height_m(p),
+        covers: &|p| object.height_m(p).is_some(),
+    };
+    let (areas, mut fine) = areas_m2(&grid, &heights, surface, &Silent).unwrap();
     let index: Vec<usize> = (0..heights.len())
         .filter(|&k| heights[k].is_some())
         .collect();

@@ -259,6 +259,32 @@ fn shape(name: &str) -> Surface {
     Surface::Mesh(Mesh::place(stl::read(&bytes).unwrap(), &transform).unwrap())
 }
 
+/// Beyond the surface, within it and on its borders.
+#[test]
+fn a_place_is_covered_where_it_has_a_height() {
+    let mut random = Random::new(19);
+    for name in ["flat", "wedge", "half_cylinder", "half_sphere"] {
+        let surface = shape(name);
+        let probe = Probe::new(&surface, &seed_region());
+        let mut covered = 0;
+        for k in 0..3000 {
+            let [x, y] = [0; 2].map(|_| random.between(-0.056, 0.056));
+            let at_m = match k % 3 {
+                0 => [x, y],
+                1 => [0.05_f64.copysign(x), y],
+                _ => [0.05 * x.cos(), 0.05 * x.sin()],
+            };
+            assert_eq!(
+                probe.covers(at_m),
+                probe.sample(at_m).is_some(),
+                "{name}: {at_m:?}"
+            );
+            covered += usize::from(probe.covers(at_m));
+        }
+        assert!((500..2900).contains(&covered), "{name}: {covered}");
+    }
+}
+
 #[test]
 #[allow(clippy::print_stdout)]
 fn graded_points_hold_their_deviation_with_fewer_than_a_grid() {

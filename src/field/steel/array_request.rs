@@ -153,7 +153,7 @@ impl CoupledArray {
                 ArraySources::of_drives(array, drives, near, false)
             }
         };
-        let (fine, coarse) = (sources(self), sources(other));
+        let (fine, coarse) = rayon::join(|| sources(self), || sources(other));
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
         for height in [0.0, 1.0, 4.0] {
@@ -362,8 +362,15 @@ impl<'a> ArrayRequest<'a> {
             let [coarse, fine] = self.resolutions(refinement);
             // Where the caps bind, two wrong solutions may agree by chance.
             let exchange = 2.0 * fine.exchange_error(self.shape, closest_m(self.positions_m));
-            let coarse = self.attempt(refinement, &coarse, &solved)?.array;
-            let mut fine = self.attempt(refinement, &fine, &solved)?;
+            let of_coarse = || (self.attempt(refinement, &coarse, &solved)).map(|made| made.array);
+            let of_fine = || self.attempt(refinement, &fine, &solved);
+            // The matrices of many cores take too much memory for two at a time.
+            let (coarse, fine) = if solved.is_empty() {
+                rayon::join(of_coarse, of_fine)
+            } else {
+                (of_coarse(), of_fine())
+            };
+            let (coarse, mut fine) = (coarse?, fine?);
             let compared = (&drives[..], &about[..]);
             let difference =
                 (fine.array).difference(&coarse, compared, self.lowest_m(), self.tolerance)?;

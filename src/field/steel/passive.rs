@@ -19,6 +19,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::CoreShape;
+use super::array::MOST_WHOLE;
 use crate::magnet::{Cylinder, NoRule};
 use isolated::{Isolated, placed};
 use magnet::PassiveMagnet;
@@ -155,9 +156,9 @@ impl Added {
     }
 
     /// The coupling that `solve` gives to a tolerance, tightened until two in a row agree to their
-    /// share of `tolerance`.
+    /// share of `tolerance`. The first two of `few` cores are solved side by side; those of many take much memory.
     fn refined(
-        solve: impl Fn(f64) -> Neighbours,
+        (solve, few): (impl Fn(f64) -> Neighbours + Sync, bool),
         places_m: &[[f64; 3]],
         alone: &[[f64; 3]],
         tolerance: f64,
@@ -165,16 +166,22 @@ impl Added {
         let of = |n: &Neighbours| -> Vec<[f64; 3]> {
             places_m.par_iter().map(|at| n.force_n(*at)).collect()
         };
-        let mut aim = first_coupling(tolerance);
-        let mut coarse = solve(aim);
+        let solved = |aim: f64| {
+            let neighbours = solve(aim);
+            let force_n = of(&neighbours);
+            (neighbours, force_n)
+        };
+        let first = first_coupling(tolerance);
+        let mut aim = FINER * first;
+        let ((mut coarse, force_n), mut next) =
+            rayon::join(|| solved(first), || few.then(|| solved(aim)));
         let mut added = Self {
-            force_n: of(&coarse),
+            force_n,
             error_n: vec![0.0; places_m.len()],
         };
         for _ in 0..MOST_COUPLINGS {
+            let (fine, finer) = next.take().unwrap_or_else(|| solved(aim));
             aim *= FINER;
-            let fine = solve(aim);
-            let finer = of(&fine);
             let mut worst = 0.0_f64;
             for (k, error) in added.error_n.iter_mut().enumerate() {
                 *error = norm(minus(added.force_n[k], finer[k]));
@@ -214,7 +221,6 @@ impl PassivePull {
         )?;
         let gap_m = magnet.gap_m();
         let resolution = ReactionResolution::for_tolerance(aim, shape, gap_m);
-        let reaction = Reaction::new(shape, pulled.relative_permeability, &resolution);
         let mut grid = Grid {
             scale_m: shape.radius_m + gap_m,
             far_m: farthest(pulled).max(1e-3 * (shape.radius_m + gap_m)),
@@ -225,7 +231,10 @@ impl PassivePull {
         // A single height still has a slope.
         let span = region.z_m[0] - shape.top_m;
         grid.heights_m[1] = grid.heights_m[1].max(region.z_m[0] + 0.05 * span);
-        let checks = Checks::new(pulled, &magnet, &resolution, &grid);
+        let (reaction, checks) = rayon::join(
+            || Reaction::new(shape, pulled.relative_permeability, &resolution),
+            || Checks::new(pulled, &magnet, &resolution, &grid),
+        );
         let Some((table_error, isolated)) = tabulated(&reaction, &magnet, grid, &checks, aim)
         else {
             return Ok(Self {
@@ -248,7 +257,8 @@ impl PassivePull {
         let coupled = pulled.coupled && pulled.positions_m.len() > 1;
         let added = if coupled {
             let solve = |aim| couple(pulled, &magnet, closest_m, aim);
-            let (neighbours, added) = Added::refined(solve, &places_m, &alone, tolerance);
+            let few = pulled.positions_m.len() <= MOST_WHOLE;
+            let (neighbours, added) = Added::refined((solve, few), &places_m, &alone, tolerance);
             pull.neighbours = Some(neighbours);
             added
         } else {

@@ -26,7 +26,8 @@ use crate::vertical_hit::is_wall;
 use fluxform_base::progress::{self, Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 
-use self::visible::{HIGHEST, Hair, Look, supremum_over_visible};
+use self::piece::Hair;
+use self::visible::{HIGHEST, Look, supremum_over_visible};
 
 pub use self::hausdorff::{Interval, hausdorff};
 pub use self::piece::{Extreme, Patch, Rect};
@@ -329,6 +330,10 @@ impl Faces {
         let mut pieces = Vec::with_capacity(leaf.faces.len());
         for &index in leaf.faces {
             let face = self.list[index as usize];
+            let [above_m, below_m] = face.most_off_m(leaf.rect, patch, self.hair);
+            if above_m <= worst.above.value_m && below_m <= worst.below.value_m {
+                continue;
+            }
             let part = face.within(leaf.rect);
             if part.width() <= self.hair.plan_m / 4.0 {
                 continue;

@@ -11,6 +11,15 @@ const MOST_CORNERS: usize = 12;
 
 pub(super) type Point = [f64; 2];
 
+/// Lengths below which two places in plan are not distinguished.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hair {
+    /// m.
+    pub(super) plan_m: f64,
+    /// m.
+    pub(super) height_m: f64,
+}
+
 /// An axis-aligned rectangle, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rect {
@@ -93,6 +102,13 @@ impl Patch {
             (high[k] - low[k]).hypot(self.height_m(high) - self.height_m(low))
         });
         usize::from(lengths[1] > lengths[0])
+    }
+
+    /// No less than the steepest rise along x plus that along y.
+    fn steepness(&self) -> f64 {
+        let [a, b, c, d] = self.corners_m;
+        let [width, depth] = self.rect.sides();
+        (b - a).abs().max((d - c).abs()) / width + (c - a).abs().max((d - b).abs()) / depth
     }
 
     /// Residual of the corners' heights about the best plane: zero for a flat patch.
@@ -186,6 +202,31 @@ impl Face {
     /// Length in space of a step along an axis.
     pub(super) fn length(&self, k: usize, step: f64) -> f64 {
         step.hypot(step * self.slope[k])
+    }
+
+    /// No less than what [`Face::height`] is above the patch, and below it, anywhere in the rectangle, rounding
+    /// included, m: what is left of a bilinear difference over a rectangle is largest at a corner.
+    pub(super) fn most_off_m(&self, rect: &Rect, patch: &Patch, hair: Hair) -> [f64; 2] {
+        let (mut low_m, mut high_m) = (rect.low_m, rect.high_m);
+        for k in 0..2 {
+            let (low, high) = self.range(k);
+            (low_m[k], high_m[k]) = (low_m[k].max(low), high_m[k].min(high));
+        }
+        let [lowest, highest] = self.heights;
+        let slope = self.slope[0].abs() + self.slope[1].abs() + patch.steepness();
+        let rounding = hair.height_m + slope * hair.plan_m;
+        let corners = Rect { low_m, high_m }.corners();
+        corners
+            .into_iter()
+            .fold([f64::NEG_INFINITY; 2], |[above, below], corner| {
+                // A sliver's plane may leave the heights of its corners, which it is held to.
+                let (plane, patch) = (self.plane(corner), patch.height_m(corner));
+                let (most, least) = (plane.max(lowest), plane.min(highest));
+                [
+                    above.max(most - patch + rounding),
+                    below.max(patch - least + rounding),
+                ]
+            })
     }
 
     /// Whether the plan of the triangle may have area in common with the rectangle.

@@ -6,16 +6,7 @@
 //! outside the region, so that what is shared with a neighbour needs no exact arithmetic.
 
 use super::Looks;
-use super::piece::{Extreme, Face, Point, Polygon, along};
-
-/// Lengths below which two places in plan are not distinguished.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Hair {
-    /// m.
-    pub(super) plan_m: f64,
-    /// m.
-    pub(super) height_m: f64,
-}
+use super::piece::{Extreme, Face, Hair, Point, Polygon, along};
 
 /// How a piece is looked at: the resolution, and how much may yet be looked at.
 #[derive(Clone, Copy)]
