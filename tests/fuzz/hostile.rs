@@ -30,7 +30,7 @@ pub fn inputs(format: SurfaceFormat) -> Vec<Hostile> {
         SurfaceFormat::ThreeMf => three_mf(),
         SurfaceFormat::Amf => amf(),
         SurfaceFormat::ThreeDxml => three_dxml(),
-        // Read by another program, in a process of its own: `tests/step` gives it such files.
+        // Read by another program, in a process of its own: `tests/programs/step.rs` gives it such files.
         SurfaceFormat::Step => Vec::new(),
         SurfaceFormat::Sldprt => sldprt(),
     }

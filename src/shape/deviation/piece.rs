@@ -441,6 +441,7 @@ pub(super) fn along(a: Point, b: Point, part: [f64; 2], value: &impl Fn(Point) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fluxform_numerics::random::Random;
 
     #[test]
     fn a_floor_is_level_and_holds_its_rectangle() {
@@ -467,5 +468,52 @@ mod tests {
         }
         let end = along(a, b, [0.5, 0.9], &value).value_m;
         assert!((end - (1.3 - 5.0 * 0.13 * 0.13)).abs() < 1e-14);
+    }
+
+    /// Slivers and steep faces among them, cut by a rectangle or not.
+    #[test]
+    fn no_face_is_farther_off_than_the_corners_say() {
+        let mut random = Random::new(11);
+        let (mut compared, mut tight) = (0, 0);
+        for case in 0..20_000 {
+            let mut next = || random.between(-1.0, 1.0);
+            let thin = 10_f64.powi(-(case % 13));
+            let from = [next(), next(), next()];
+            let along = [next(), next(), next()];
+            let away = [thin * next(), thin * next(), next()];
+            let corner = |a: f64, b: f64| [0, 1, 2].map(|k| from[k] + a * along[k] + b * away[k]);
+            let triangle = [corner(0.0, 0.0), corner(1.0, 0.0), corner(next(), 1.0)];
+            let rect = Rect {
+                low_m: [-0.3 + 0.2 * next(), -0.3 + 0.2 * next()],
+                high_m: [0.4 + 0.2 * next(), 0.4 + 0.2 * next()],
+            };
+            let patch = Patch {
+                rect,
+                corners_m: [0; 4].map(|_| next()),
+            };
+            let part = rect.quarters()[case as usize % 4];
+            let Some(face) = Face::new(&triangle) else {
+                continue;
+            };
+            let inside = face.within(&part);
+            if inside.count == 0 {
+                continue;
+            }
+            let hair = Hair {
+                plan_m: 1e-12,
+                height_m: 1e-12,
+            };
+            let off = |sign: f64| {
+                let value = |p| sign * (face.height(p) - patch.height_m(p));
+                inside.supremum(value).value_m
+            };
+            let most = face.most_off_m(&part, &patch, hair);
+            for (found, most) in [off(1.0), off(-1.0)].into_iter().zip(most) {
+                assert!(found <= most, "{case}: {found} {most}");
+                tight += usize::from(most - found < 1e-3);
+            }
+            compared += 1;
+        }
+        assert!(compared > 3000 && tight > 300, "{compared} {tight}");
     }
 }

@@ -23,7 +23,7 @@ fn in_a_browser(html: &str) {
     let page = folder.path().join(PAGE);
     std::fs::write(&page, html).unwrap();
     let run = Command::new("python3")
-        .arg(repository("tests/report/browser.py"))
+        .arg(repository("tests/programs/report/browser.py"))
         .arg("check")
         .arg(&page)
         .output();

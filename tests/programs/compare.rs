@@ -1,8 +1,6 @@
 //! `compare`: differences that are known in closed form, symmetry, limits, the command itself.
-#![allow(clippy::disallowed_methods)] // tests write their own files
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use fluxform::bundle::artefact::Input;
 use fluxform::commands::compare::{CompareOptions, CompareReport, Pair, run};
@@ -10,15 +8,16 @@ use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::ShapeSource;
 use fluxform::shape::document::ShapeDocument;
+use fluxform_testing::needs::Trial;
 use fluxform_testing::place::Place;
 use fluxform_testing::{committed, needs, root, trials};
 use serde_json::Value;
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         None => [an_object_does_not_differ_from_itself, the_order_does_not_matter, the_map_holds_the_largest_difference_with_its_sign, a_lifted_surface_is_apart_by_its_height_with_feedback, beside_an_object_there_is_no_force_with_feedback, stronger_currents_only_lift_weak_forces_over_the_threshold, the_unpowered_steel_pulls_on_both_alike, where_nothing_can_be_rendered_nothing_is_compared, the_bytes_do_not_depend_on_threads, the_command_reports_draws_and_refuses],
         needs::python() => [the_confusions_are_what_the_readme_shows],
-    })
+    }
 }
 
 const JND: f64 = 0.07;

@@ -1,21 +1,20 @@
 //! The files for mag_manip: read back by hand, and by mag_manip itself.
 //!
-//! The latter needs a Python with the package mag-manip: what `FLUXFORM_MAGMANIP_PYTHON` names, or
-//! `python3.11` or `python3`. Without one that test is reported as ignored.
-#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may print what it compared
-#![allow(clippy::disallowed_methods)] // a test writes where it likes
+//! The latter needs a Python with the package mag-manip (`scripts/peers/requirements_magmanip.txt`): what
+//! `FLUXFORM_MAGMANIP_PYTHON` names, or `python3.11` or `python3`. Without one that test is reported as ignored.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, Output};
 
 use fluxform::map::multipole::{PARTS, Source, magnitudes};
+use fluxform_testing::needs::Trial;
 use fluxform_testing::run::program;
-use fluxform_testing::{needs, root, trials};
+use fluxform_testing::{root, trials};
 use serde_json::Value;
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         None => [
             nodes_hold_what_probe_says_x_slowest,
             sources_of_air_coils_stand_on_their_own_axes,
@@ -25,7 +24,7 @@ fn main() -> ExitCode {
             wrong_usage_and_unsuitable_workspaces_are_reported,
         ],
         missing() => [mag_manip_reads_what_is_stated],
-    })
+    }
 }
 
 fn fluxform(arguments: &[&str]) -> Output {
@@ -447,9 +446,7 @@ fn python() -> Option<PathBuf> {
 }
 
 fn missing() -> Option<String> {
-    let missing = "a Python with numpy and mag_manip (pip install -r \
-                   scripts/peers/requirements_magmanip.txt, then FLUXFORM_MAGMANIP_PYTHON=...)";
-    python().is_none().then(|| missing.to_owned())
+    (python().is_none()).then(|| "Python with mag_manip".to_owned())
 }
 
 fn mag_manip_reads_what_is_stated() {

@@ -4,7 +4,7 @@
 # The first two are killed half way and begun again; all are compared byte for byte with the sweep in one
 # piece, and so are the drives of a coupled array in two parts.
 #
-#   tests/cluster/run_local.sh path/to/fluxform [parallel|slurm|snakemake]
+#   tests/programs/cluster/run_local.sh path/to/fluxform [parallel|slurm|snakemake]
 #
 # Says "skipped: ..." for what cannot run here (Debian: apt-get install slurm-wlm parallel, the
 # daemons need root; pip install snakemake). Ends with 0 when all that ran agreed.

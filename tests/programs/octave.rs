@@ -1,10 +1,9 @@
 //! GNU Octave reads a bundle: with its own functions, and with `scripts/load_bundle.m`, whose
 //! forces, heights and currents are Rust's. The same file serves MATLAB, which is not tried here.
-#![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, Output};
 
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
@@ -12,17 +11,18 @@ use fluxform::commands::replay::renderer::Renderer;
 use rayon::prelude::*;
 
 use fluxform_testing::bundle::*;
+use fluxform_testing::needs::Trial;
 use fluxform_testing::{Random, needs, root, trials};
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         needs::octave() => [
             octave_and_rust_give_the_same_forces_heights_and_currents,
             octave_reads_the_tables_and_the_json_files_by_its_own_functions,
             a_loaded_map_goes_into_a_mat_file,
             a_changed_file_is_refused,
         ],
-    })
+    }
 }
 
 fn command(folder: &Path, script: &str) -> Command {

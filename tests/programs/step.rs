@@ -2,16 +2,16 @@
 //!
 //! Those that read bodies need a Python with `cadquery-ocp`: `python3`, or what `FLUXFORM_PYTHON`
 //! names. Without one they are reported as ignored. The parts are made by `parts.py` beside this.
-#![allow(clippy::disallowed_methods)] // a test writes where it likes
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, Output};
 
-use fluxform_testing::{needs, root, surface_files, trials};
+use fluxform_testing::needs::Trial;
+use fluxform_testing::{root, surface_files, trials};
 use serde_json::Value;
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         None => [
             without_opencascade_the_message_names_how_step_is_read,
             anything_but_a_step_file_is_refused_before_python_starts,
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
             hostile_files_end_in_a_message,
             a_bundle_of_a_step_file_is_verified,
         ],
-    })
+    }
 }
 
 /// The Python that reads STEP files.
@@ -69,7 +69,7 @@ fn text(output: &Output) -> String {
 fn parts() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let made = Command::new(python())
-        .arg(root().join("tests/step/parts.py"))
+        .arg(root().join("tests/programs/step/parts.py"))
         .arg(folder.path())
         .output()
         .unwrap();

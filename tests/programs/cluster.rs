@@ -1,22 +1,22 @@
 //! A sweep and a coupled array as a cluster runs them: GNU parallel and a Slurm of its own, each killed half
 //! way and begun again, and Snakemake.
-#![allow(clippy::print_stderr)] // what the script reports
 
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
+use fluxform_testing::needs::Trial;
 use fluxform_testing::run::program;
 use fluxform_testing::{needs, root, trials};
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         needs::tool("parallel") => [shards_under_gnu_parallel],
         needs::tool("sbatch") => [a_job_array_under_slurm],
         needs::tool("snakemake") => [workflows_under_snakemake],
-    })
+    }
 }
 
 fn run(with: &str) {
-    let script = root().join("tests/cluster/run_local.sh");
+    let script = root().join("tests/programs/cluster/run_local.sh");
     let output = Command::new("bash")
         .arg(script)
         .args([program().to_str().unwrap(), with])

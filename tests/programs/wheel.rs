@@ -1,17 +1,17 @@
 //! The Python package as people get it: the wheel is built, installed into an empty virtual
 //! environment where no compiler is to be found, and used there.
-#![allow(clippy::disallowed_methods)]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 use std::sync::LazyLock;
 
+use fluxform_testing::needs::Trial;
 use fluxform_testing::{needs, root, trials};
 use tempfile::TempDir;
 
-fn main() -> ExitCode {
+pub fn trials() -> Vec<Trial> {
     let missing = || needs::numpy().or_else(|| needs::tool("maturin"));
-    needs::run(trials! {
+    trials! {
         missing() => [
             the_program_is_in_the_wheel,
             the_source_distribution_holds_what_a_build_needs,
@@ -24,7 +24,7 @@ fn main() -> ExitCode {
             the_examples_of_the_documentation_run,
             the_notebook_runs_from_a_design_to_felt_forces,
         ],
-    })
+    }
 }
 
 /// The wheel in a virtual environment that sees numpy and nothing else of this machine's tools.
@@ -88,7 +88,7 @@ fn installed(program: &str, folder: &Path) -> Command {
 /// Runs a function of `checks.py`.
 fn check(name: &str) {
     let folder = tempfile::tempdir().unwrap();
-    let script = root().join("tests/wheel/checks.py");
+    let script = root().join("tests/programs/wheel/checks.py");
     run(installed("python", folder.path()).arg(script).arg(name));
 }
 
@@ -177,7 +177,7 @@ fn the_examples_of_the_documentation_run() {
 
 fn the_notebook_runs_from_a_design_to_felt_forces() {
     let folder = tempfile::tempdir().unwrap();
-    let script = root().join("tests/wheel/checks.py");
+    let script = root().join("tests/programs/wheel/checks.py");
     let printed = run(installed("python", folder.path())
         .arg(script)
         .arg("notebook")

@@ -1,17 +1,18 @@
 //! Pages: their contents, that inputs stay texts, and that a browser draws them.
 
 use std::path::Path;
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, Output};
 
+use fluxform_testing::needs::Trial;
 use fluxform_testing::place::Place;
 use fluxform_testing::{needs, root, trials};
 use serde_json::Value;
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_agrees_with_the_files, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages, a_replay_is_watched_on_a_page],
         no_browser() => [a_browser_draws_the_page_and_answers, a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep, a_browser_moves_the_finger_of_a_replay],
-    })
+    }
 }
 
 const DESIGN: &str = "designs/seed_air.toml";
@@ -358,7 +359,7 @@ fn a_browser_moves_the_finger_of_a_replay() {
 /// Output of the script that drives a browser.
 fn browser(page: &Path) -> Output {
     let mut python = Command::new("python3");
-    let script = python.arg(root().join("tests/report/browser.py"));
+    let script = python.arg(root().join("tests/programs/report/browser.py"));
     script.arg("check").arg(page).output().unwrap()
 }
 

@@ -1,23 +1,23 @@
 //! The bar at a terminal: what it shows, and that nothing of it is left behind.
-#![allow(clippy::disallowed_methods)] // opens the terminal's other end
 
 use std::fs::{File, OpenOptions};
 use std::io::Read;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
+use fluxform_testing::needs::Trial;
 use fluxform_testing::place::Place;
-use fluxform_testing::{needs, trials};
+use fluxform_testing::trials;
 
 const SEED: &str = "designs/seed_air.toml";
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         no_terminal() => [ctrl_c_leaves_no_bar_behind, a_bench_shows_how_far_it_is_in_all],
-    })
+    }
 }
 
 /// Pseudo-terminals, where there are none.

@@ -54,10 +54,9 @@ fn every_fast_case_passes() {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// `cargo test -p fluxform-bench --test extreme -- --ignored --nocapture` prints the whole table.
+/// `cargo test -p fluxform-bench --test stages extreme -- --ignored --nocapture` prints the whole table.
 #[test]
 #[ignore = "minutes: the whole catalogue, as `fluxform-bench --extreme` runs it"]
-#[allow(clippy::print_stdout)]
 fn the_whole_table() {
     let only = std::env::var("ONLY").unwrap_or_default();
     let mut all = cases();

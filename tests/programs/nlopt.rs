@@ -1,31 +1,31 @@
 //! `optimize` against NLopt and an independent model of the coil (`scripts/nlopt_reference.py`).
 //!
-//! Needs a Python with numpy, scipy and nlopt: `python3`, or what `FLUXFORM_PYTHON` names. Without
-//! one the tests are reported as ignored. `FLUXFORM_NLOPT=all` judges all problems instead of those
-//! marked `ci`, and solves all of them again.
-#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may print what it compared
+//! Needs a Python with numpy, scipy and nlopt (`scripts/nlopt_requirements.txt`): `python3`, or what
+//! `FLUXFORM_PYTHON` names. Without one the tests are reported as ignored. `FLUXFORM_NLOPT=all` judges all problems
+//! instead of those marked `ci`, and solves all of them again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, Output};
 
 use fluxform::commands::evaluate::evaluate;
 use fluxform::design::{Design, Need};
+use fluxform_testing::needs::Trial;
 use fluxform_testing::run::program;
-use fluxform_testing::{Random, needs, root, trials};
+use fluxform_testing::{Random, root, trials};
 use serde_json::{Value, json};
 
 const DESIGNS: usize = 100;
 
-fn main() -> ExitCode {
-    needs::run(trials! {
+pub fn trials() -> Vec<Trial> {
+    trials! {
         missing() => [
             both_models_agree_on_random_designs,
             no_problem_has_a_better_coil_and_no_limit_is_missed,
             wrong_models_fail_the_judge,
             the_reference_is_what_its_script_finds,
         ],
-    })
+    }
 }
 
 /// `python3`, or the one that `FLUXFORM_PYTHON` names.
@@ -39,12 +39,7 @@ fn missing() -> Option<String> {
         .args(["-c", "import numpy, scipy, nlopt"])
         .output();
     let there = run.is_ok_and(|run| run.status.success());
-    (!there).then(|| {
-        format!(
-            "numpy, scipy and nlopt for {} (pip install -r scripts/nlopt_requirements.txt)",
-            python().display()
-        )
-    })
+    (!there).then(|| "Python with numpy, scipy and nlopt".to_owned())
 }
 
 fn script(python: &Path, arguments: &[&str]) -> Output {

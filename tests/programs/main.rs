@@ -1,0 +1,38 @@
+//! What needs another program beside Rust: Python with its packages, Octave, a browser, a terminal, a cluster.
+#![allow(clippy::disallowed_methods, clippy::print_stderr, clippy::print_stdout)]
+
+mod cluster;
+mod compare;
+mod magmanip;
+mod nlopt;
+mod octave;
+mod report;
+mod step;
+mod terminal;
+mod wheel;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let mut rooms = [
+        wheel::trials(),
+        nlopt::trials(),
+        report::trials(),
+        step::trials(),
+        octave::trials(),
+        magmanip::trials(),
+        compare::trials(),
+        terminal::trials(),
+        cluster::trials(),
+    ];
+    // In turn, the longest first: the tests of the wheel wait for it to be built, and others for a process each.
+    let most = rooms.iter().map(Vec::len).max().unwrap_or(0);
+    for room in &mut rooms {
+        room.reverse();
+    }
+    let in_turn = (0..most).flat_map(|_| {
+        let next: Vec<_> = rooms.iter_mut().filter_map(Vec::pop).collect();
+        next
+    });
+    fluxform_testing::needs::run(in_turn)
+}
