@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 use fluxform::map::multipole::{PARTS, Source, magnitudes};
 use fluxform_testing::needs::Trial;
 use fluxform_testing::run::program;
-use fluxform_testing::{root, trials};
+use fluxform_testing::{needs, root, trials};
 use serde_json::Value;
 
 pub fn trials() -> Vec<Trial> {
@@ -437,12 +437,8 @@ fn python() -> Option<PathBuf> {
         Some(named) => vec![named.into()],
         None => vec!["python3.11".into(), "python3".into()],
     };
-    named.into_iter().find(|python| {
-        let run = Command::new(python)
-            .args(["-c", "import numpy; from mag_manip import mag_manip"])
-            .output();
-        run.is_ok_and(|run| run.status.success())
-    })
+    let has = ["-c", "import numpy; from mag_manip import mag_manip"];
+    (named.into_iter()).find(|python| needs::answers(python, &has))
 }
 
 fn missing() -> Option<String> {

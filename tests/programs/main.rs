@@ -11,7 +11,13 @@ mod step;
 mod terminal;
 mod wheel;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
+
+/// `python3`, or the one that `FLUXFORM_PYTHON` names.
+fn python() -> PathBuf {
+    std::env::var_os("FLUXFORM_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
+}
 
 fn main() -> ExitCode {
     let mut rooms = [

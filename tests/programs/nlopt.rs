@@ -12,8 +12,10 @@ use fluxform::commands::evaluate::evaluate;
 use fluxform::design::{Design, Need};
 use fluxform_testing::needs::Trial;
 use fluxform_testing::run::program;
-use fluxform_testing::{Random, root, trials};
+use fluxform_testing::{Random, needs, root, trials};
 use serde_json::{Value, json};
+
+use super::python;
 
 const DESIGNS: usize = 100;
 
@@ -28,17 +30,8 @@ pub fn trials() -> Vec<Trial> {
     }
 }
 
-/// `python3`, or the one that `FLUXFORM_PYTHON` names.
-fn python() -> PathBuf {
-    std::env::var_os("FLUXFORM_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
-}
-
-/// A Python that has what the script needs, where there is none.
 fn missing() -> Option<String> {
-    let run = Command::new(python())
-        .args(["-c", "import numpy, scipy, nlopt"])
-        .output();
-    let there = run.is_ok_and(|run| run.status.success());
+    let there = needs::answers(python(), &["-c", "import numpy, scipy, nlopt"]);
     (!there).then(|| "Python with numpy, scipy and nlopt".to_owned())
 }
 

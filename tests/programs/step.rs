@@ -3,12 +3,14 @@
 //! Those that read bodies need a Python with `cadquery-ocp`: `python3`, or what `FLUXFORM_PYTHON`
 //! names. Without one they are reported as ignored. The parts are made by `parts.py` beside this.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use fluxform_testing::needs::Trial;
-use fluxform_testing::{root, surface_files, trials};
+use fluxform_testing::{needs, root, surface_files, trials};
 use serde_json::Value;
+
+use super::python;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
@@ -34,19 +36,9 @@ pub fn trials() -> Vec<Trial> {
     }
 }
 
-/// The Python that reads STEP files.
-fn python() -> PathBuf {
-    std::env::var_os("FLUXFORM_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
-}
-
 fn missing() -> Option<String> {
-    let found = Command::new(python())
-        .args(["-I", "-c", "import OCP.STEPCAFControl"])
-        .output();
-    match found {
-        Ok(output) if output.status.success() => None,
-        _ => Some("Python with cadquery-ocp".to_owned()),
-    }
+    let there = needs::answers(python(), &["-I", "-c", "import OCP.STEPCAFControl"]);
+    (!there).then(|| "Python with cadquery-ocp".to_owned())
 }
 
 fn fluxform(arguments: &[&str], folder: &Path) -> Output {
