@@ -74,20 +74,20 @@ pub(super) fn largest_entries(problem: &ForceProblem) -> Vec<f64> {
 }
 
 /// The coils that count: all but those with neither force nor current, such as broken ones, unless that is all.
-pub(super) fn driven_coils(problem: &ForceProblem, largest: &[f64]) -> Vec<usize> {
+pub(super) fn counted_coils(problem: &ForceProblem, largest: &[f64]) -> Vec<usize> {
     let all = 0..problem.coils();
     let counts = |&i: &usize| largest[i] > 0.0 || problem.reach_a(i) > 0.0;
-    let driven: Vec<usize> = all.clone().filter(counts).collect();
-    if driven.is_empty() {
+    let counted: Vec<usize> = all.clone().filter(counts).collect();
+    if counted.is_empty() {
         return all.collect();
     }
-    driven
+    counted
 }
 
 /// The columns of those coils, of heights and offset, with the exponents of their largest values.
-fn driven_columns(problem: &ForceProblem, largest: &[f64]) -> Vec<(usize, i32)> {
+fn counted_columns(problem: &ForceProblem, largest: &[f64]) -> Vec<(usize, i32)> {
     let rest = problem.coils()..largest.len();
-    let all = driven_coils(problem, largest).into_iter().chain(rest);
+    let all = counted_coils(problem, largest).into_iter().chain(rest);
     all.map(|j| (j, exponent_of(largest[j]))).collect()
 }
 
@@ -101,7 +101,7 @@ pub(super) struct Reduced {
     scale: Vec<i32>,
     coils: usize,
     /// Coils that count.
-    driven: Vec<usize>,
+    counted: Vec<usize>,
     /// Exponent f of the unit of force.
     force_scale: i32,
     /// The same of lambda': `lambda = lambda' 2^lambda_scale`.
@@ -168,10 +168,10 @@ fn fill_rows<T: Real>(
 impl Reduced {
     /// By reflections of the points, whatever the columns.
     pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
-        let driven = driven_columns(problem, largest);
+        let counted = counted_columns(problem, largest);
         let heaviest = T::of(problem.heaviest());
         let fill = |range: Range<usize>, block: &mut [T], stride: usize| {
-            fill_rows(problem, &driven, range.clone(), block, stride);
+            fill_rows(problem, &counted, range.clone(), block, stride);
             let Some(weights) = problem.weights else {
                 return;
             };
@@ -181,10 +181,10 @@ impl Reduced {
                 }
             }
         };
-        let (points, width) = (problem.points(), driven.len());
-        let undriven = largest.len() - width;
+        let (points, width) = (problem.points(), counted.len());
+        let left_out = largest.len() - width;
         // Of fewer points than coils the rows themselves are the least that says everything.
-        let columns = if points + undriven < problem.coils() {
+        let columns = if points + left_out < problem.coils() {
             let mut block = vec![T::ZERO; points * width];
             fill(0..points, &mut block, points);
             block
@@ -199,18 +199,18 @@ impl Reduced {
                 weights.iter().fold(Num::ZERO, sum)
             }
         };
-        Self::of_columns(problem, driven, &columns, total, T::EPSILON)
+        Self::of_columns(problem, counted, &columns, total, T::EPSILON)
     }
 
     /// By the products of the columns, in double-double: quicker, for coils' columns of this condition
     /// number. `None` where a column or the heights depend too nearly on others.
     pub fn by_products(problem: &ForceProblem, largest: &[f64], condition: f64) -> Option<Self> {
-        let driven = driven_columns(problem, largest);
+        let counted = counted_columns(problem, largest);
         let unit = power_of_two(-exponent_of(problem.heaviest()));
         let triangle = triangular_factor_by_products(
             problem.points(),
-            driven.len(),
-            |range, block, stride| fill_rows(problem, &driven, range, block, stride),
+            counted.len(),
+            |range, block, stride| fill_rows(problem, &counted, range, block, stride),
             |range, to| match problem.weights {
                 None => to.fill(1.0),
                 Some(weights) => copy(to, weights[range].iter().map(|&weight| weight * unit)),
@@ -225,35 +225,35 @@ impl Reduced {
         };
         let epsilon = Num::EPSILON * condition;
         let columns = triangle.into_columns();
-        Some(Self::of_columns(problem, driven, &columns, total, epsilon))
+        Some(Self::of_columns(problem, counted, &columns, total, epsilon))
     }
 
-    /// From what the scaled columns of `driven` coils, heights and offset, whose weights add up to `total`, are turned
+    /// From what the scaled columns of `counted` coils, heights and offset, whose weights add up to `total`, are turned
     /// to, one after another.
     fn of_columns<T: Real>(
         problem: &ForceProblem,
-        driven: Vec<(usize, i32)>,
+        counted: Vec<(usize, i32)>,
         turned: &[T],
         total: Num,
         epsilon: f64,
     ) -> Self {
         let coils = problem.coils();
         let root = Num::ONE / total.sqrt();
-        let rows = turned.len() / driven.len();
+        let rows = turned.len() / counted.len();
         let all = coils + 1 + usize::from(problem.offset_n.is_some());
         let (mut scale, mut columns) = (vec![0; all], vec![vec![Num::ZERO; rows]; all]);
-        for (column, &(j, exponent)) in turned.chunks_exact(rows).zip(&driven) {
+        for (column, &(j, exponent)) in turned.chunks_exact(rows).zip(&counted) {
             let column: Vec<Num> = column.iter().map(|&v| v.widened() * root).collect();
             let more = exponent_of(Num::dot(&column, &column).sqrt().to_f64());
             let factor = Num::of(power_of_two(-more));
             columns[j] = column.into_iter().map(|v| v * factor).collect();
             scale[j] = exponent + more;
         }
-        let driven: Vec<usize> = (driven.into_iter().map(|(j, _)| j))
+        let counted: Vec<usize> = (counted.into_iter().map(|(j, _)| j))
             .filter(|&j| j < coils)
             .collect();
         let reach = |i: usize| problem.reach_a(i);
-        let force_scale = (driven.iter().copied())
+        let force_scale = (counted.iter().copied())
             .filter(|&i| reach(i) > 0.0 && columns[i].iter().any(|&v| v != Num::ZERO))
             .map(|i| exponent_of(reach(i)) + scale[i])
             .max()
@@ -263,7 +263,7 @@ impl Reduced {
             columns,
             scale,
             coils,
-            driven,
+            counted,
             force_scale,
             lambda_scale,
             epsilon,
@@ -283,15 +283,15 @@ impl Reduced {
     }
 
     /// Number of coils that count.
-    pub fn driven(&self) -> usize {
-        self.driven.len()
+    pub fn counted(&self) -> usize {
+        self.counted.len()
     }
 
-    /// Condition number in the Frobenius norm of the driven coils' columns, each scaled to unit length; infinite
+    /// Condition number in the Frobenius norm of the counted coils' columns, each scaled to unit length; infinite
     /// where they depend on each other.
     pub fn condition(&self) -> f64 {
-        let n = self.driven();
-        let units: Vec<Vec<f64>> = (self.driven.iter())
+        let n = self.counted();
+        let units: Vec<Vec<f64>> = (self.counted.iter())
             .enumerate()
             .map(|(j, coil)| {
                 let column = &self.columns[*coil];
@@ -364,10 +364,10 @@ impl Reduced {
         Some(self.cut(columns, rank, moved))
     }
 
-    /// `None` where the columns of all driven coils are independent.
+    /// `None` where the columns of all counted coils are independent.
     fn pivoted(&self, share: f64) -> Option<Pivoted> {
         let pivoted = Pivoted::new(self.columns.clone(), self.coils, share);
-        (pivoted.members.len() < self.driven()).then_some(pivoted)
+        (pivoted.members.len() < self.counted()).then_some(pivoted)
     }
 
     /// Turned columns, those of coils without anything below `rank`, with the fewest rows: one below it is enough for
@@ -513,7 +513,7 @@ mod tests {
                     ],
                     scale: vec![0; 3],
                     coils: 3,
-                    driven: vec![0, 1, 2],
+                    counted: vec![0, 1, 2],
                     force_scale: 0,
                     lambda_scale: 0,
                     epsilon: Num::EPSILON,

@@ -15,7 +15,7 @@ use super::homotopy::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
-use super::qr_reduction::{Reduced, driven_coils, largest_entries, times_power};
+use super::qr_reduction::{Reduced, counted_coils, largest_entries, times_power};
 use super::rest;
 use super::worst;
 
@@ -298,7 +298,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     problem.comparable(&largest)?;
     let (solved, rank, precision) = solve_paths(problem, &largest, Extent::Whole);
     let mut path = solved.path(problem);
-    if rank < solved.reduced.driven() && solved.doubt == 0.0 {
+    if rank < solved.reduced.counted() && solved.doubt == 0.0 {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
     let finish = match precision {
@@ -362,23 +362,23 @@ pub(super) fn solve_paths(
     largest: &[f64],
     extent: Extent,
 ) -> (Solved, usize, Precision) {
-    let driven = driven_coils(problem, largest);
+    let counted = counted_coils(problem, largest);
     let mut condition = None;
-    if problem.points() >= driven.len() && driven.iter().all(|&coil| largest[coil] > 0.0) {
+    if problem.points() >= counted.len() && counted.iter().all(|&coil| largest[coil] > 0.0) {
         let reduced = Reduced::new::<f64>(problem, largest);
         let plain = reduced.condition();
         condition = Some(plain).filter(|&condition| condition <= INDEPENDENT);
         if plain <= PLAIN_CONDITION
             && let Some(solved) = solve_plainly(problem, extent, reduced)
         {
-            return (solved, driven.len(), Precision::Double);
+            return (solved, counted.len(), Precision::Double);
         }
     }
     let reduced = condition
         .and_then(|condition| Reduced::by_products(problem, largest, condition))
         .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
     let (solved, rank) = match condition {
-        Some(_) => (Solved::new(problem, extent, reduced), driven.len()),
+        Some(_) => (Solved::new(problem, extent, reduced), counted.len()),
         None => solve_dependent(problem, extent, reduced),
     };
     (solved, rank, Precision::DoubleDouble)
@@ -400,7 +400,7 @@ fn solve_dependent(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> 
     let clean = reduced.with_clean_dependences();
     let exact = match &clean {
         Some(clean) => (&clean.reduced, clean.rank),
-        None => (&reduced, reduced.driven()),
+        None => (&reduced, reduced.counted()),
     };
     if let Some(solved) = solve_strong(problem, extent, &reduced, exact) {
         return (solved, exact.1);
@@ -442,7 +442,7 @@ fn solve_strong(
         Extent::ToJnd(_) => WEAK_FOR_JND,
     };
     // The path over few points is straight as long as the force is exact.
-    if problem.points() < reduced.driven() || problem.offset_n.is_some() {
+    if problem.points() < reduced.counted() || problem.offset_n.is_some() {
         return None;
     }
     let strong = reduced.without_weak_parts(share)?;
@@ -490,7 +490,7 @@ fn first_and_jnd(
 ) -> (Option<f64>, Option<f64>) {
     let linear = if comparison.mean_square <= Num::ZERO {
         None
-    } else if rank == solved.reduced.driven() {
+    } else if rank == solved.reduced.counted() {
         comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
     } else {
         comparison.linear_by_error()

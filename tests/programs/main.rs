@@ -20,7 +20,7 @@ fn python() -> PathBuf {
 }
 
 fn main() -> ExitCode {
-    let mut rooms = [
+    let rooms = [
         wheel::trials(),
         nlopt::trials(),
         report::trials(),
@@ -33,11 +33,9 @@ fn main() -> ExitCode {
     ];
     // In turn, the longest first: the tests of the wheel wait for it to be built, and others for a process each.
     let most = rooms.iter().map(Vec::len).max().unwrap_or(0);
-    for room in &mut rooms {
-        room.reverse();
-    }
+    let mut rooms = rooms.map(Vec::into_iter);
     let in_turn = (0..most).flat_map(|_| {
-        let next: Vec<_> = rooms.iter_mut().filter_map(Vec::pop).collect();
+        let next: Vec<_> = rooms.iter_mut().filter_map(Iterator::next).collect();
         next
     });
     fluxform_testing::needs::run(in_turn)
