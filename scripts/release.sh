@@ -37,7 +37,7 @@ trap 'rm -rf "$stage"' EXIT
 mkdir -p "$stage/$name/completions" "$stage/$name/man"
 cp "$program" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$stage/$name/"
 cp -r designs shapes "$stage/$name/"
-mkdir "$stage/$name/results" && cp results/README.md results/half_sphere.svg "$stage/$name/results/"
+mkdir "$stage/$name/results" && cp results/README.md results/half_sphere.svg results/face.png "$stage/$name/results/"
 "$program" man --out "$stage/$name/man"
 for shell in bash zsh fish; do
     "$program" completions "$shell" >"$stage/$name/completions/fluxform.$shell"

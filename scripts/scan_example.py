@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes designs/scan_example.csv: a scan of designs/seed_air.toml as a Gauss-meter might give it.
+"""Makes designs/scan_example.csv: a scan of designs/seed_air.toml as a gaussmeter might give it.
 
 Coil 4 is 3 % stronger and coil 5 is 2 % weaker than designed, the sensor sits 0.4 mm to the right of
 and 0.7 mm above where it says, the earth's field is there, and every value has 2 uT of noise.

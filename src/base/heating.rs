@@ -22,7 +22,7 @@ pub struct Cooling {
     pub surface_w_per_m2_k: f64,
     /// Temperature of the air, C.
     pub ambient_c: f64,
-    /// Temperature that the wire's insulation stands for long, C.
+    /// Temperature that the wire's insulation withstands continuously, C.
     pub winding_max_c: f64,
     /// How long currents flow for which a temperature is stated, s.
     pub heating_s: f64,
@@ -60,7 +60,7 @@ pub struct Heating {
     pub heating_s: f64,
     /// Temperature after that time, C; null where copper melts.
     pub after_c: Option<f64>,
-    /// Temperature that the insulation stands for long, C.
+    /// Temperature that the insulation withstands continuously, C.
     pub winding_max_c: f64,
     /// Time until that is reached, s; null where it never is.
     pub winding_max_s: Option<f64>,

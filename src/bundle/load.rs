@@ -131,7 +131,7 @@ impl Bundle {
         for entry in &manifest.files {
             paths.push(listed.checked(entry)?);
             if !names.insert(entry.path.as_str()) {
-                return Err(listed.refused(entry, "stands there twice"));
+                return Err(listed.refused(entry, "is there twice"));
             }
         }
         let mut files = Vec::new();

@@ -1,4 +1,4 @@
-//! Gauss-meter scans: the table that is read, the comparison and the residuals that are written.
+//! gaussmeter scans: the table that is read, the comparison and the residuals that are written.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};

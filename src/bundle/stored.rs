@@ -61,7 +61,7 @@ pub(super) fn entries(bytes: &[u8]) -> Result<BTreeMap<&[u8], &[u8]>, String> {
             .map_err(|message| format!("{} {message}", String::from_utf8_lossy(name)))?;
         if entries.insert(name, content).is_some() {
             let name = String::from_utf8_lossy(name);
-            return Err(format!("{name} stands there twice"));
+            return Err(format!("{name} is there twice"));
         }
     }
     if heads.is_empty() {

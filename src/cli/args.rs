@@ -138,7 +138,7 @@ pub struct Writing {
     next_help_heading = "Surfaces given directly (not for shape files, which say it themselves)"
 )]
 pub struct SurfaceFlags {
-    /// mm, cm, m, in, ft or um; required for STL, OBJ and PLY
+    /// mm, cm, m, in, ft, um; required for STL, OBJ, PLY, OFF, PNG
     #[arg(long, value_name = "UNIT", value_parser = values::unit)]
     pub unit: Option<f64>,
     /// Enlarge by a factor, or by factors along x, y and z, before anything else
@@ -181,7 +181,7 @@ pub struct SurfaceFlags {
     /// STEP: the one body or assembly to read, by name or number (see --inspect)
     #[arg(long, hide_short_help = true, value_name = "N|NAME")]
     pub body: Option<String>,
-    /// Constraint points along x and y [default: 61x61]
+    /// Constraint points along x and y [default: 61x61; `lambda` and `calibrate`: as many as --error needs]
     #[arg(long, hide_short_help = true, value_name = "NxM", value_parser = values::grid_size)]
     pub grid: Option<values::GridSize>,
     /// Extent of the points along x, like -50,50 or -5cm,5cm [default: the surface's own]

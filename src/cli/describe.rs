@@ -116,7 +116,10 @@ pub fn heating(of: &Heating) -> String {
     let steady = of.steady_c.map_or_else(melted, celsius);
     let limit = of.winding_max_s.map_or_else(String::new, |time_s| {
         let limit = celsius(of.winding_max_c);
-        format!("; {limit} after {}: no continuous mode", duration(time_s))
+        format!(
+            "; {limit} after {}: not for continuous operation",
+            duration(time_s)
+        )
     });
     format!(
         "{} W at {}: from {} to {after} after {}, {steady} in the long run{limit}",
@@ -139,7 +142,7 @@ pub fn chosen_by(file: &LambdaFile) -> String {
         by
     } else if (file.jnd - FORCE_JND).abs() < 1e-12 {
         format!(
-            "{by}, measured at 2.5 to 10 N; below {} N {} to {} are found",
+            "{by}, measured at 2.5 to 10 N; below {} N {} to {} were measured",
             number(FAINT_FORCE_N),
             number(least * 100.0),
             percent(most)

@@ -206,7 +206,7 @@ pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
     Ok((points, Input::of_bytes(name, &bytes)))
 }
 
-/// A Gauss-meter's scan over an array of `coils`, and its entry among the inputs.
+/// A gaussmeter's scan over an array of `coils`, and its entry among the inputs.
 ///
 /// # Errors
 /// Missing columns, cells that are no numbers, a file that cannot be read.

@@ -23,7 +23,7 @@ impl Codes {
             Self::None => "",
             Self::Reading => {
                 "\n  3    a bad input file: every fault is reported with its place\n  \
-                 4    a result that does not meet the request (see above)\n  \
+                 4    a result that does not meet the request (see above); or an output that cannot be written\n  \
                  130  interrupted"
             }
             Self::Writing => {

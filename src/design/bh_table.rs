@@ -40,7 +40,7 @@ pub fn read_bh_table(path: &Path) -> Result<BhTable, InvalidDocument> {
 impl BhTable {
     /// The table that `text` holds; `path` names it in messages.
     ///
-    /// One header line `b_t,h_a_per_m` (either order), then one row a point. A byte order mark,
+    /// One header line `b_t,h_a_per_m` (either order), then one row per point. A byte order mark,
     /// CRLF, empty lines and blanks around cells are tolerated.
     ///
     /// # Errors
@@ -117,12 +117,13 @@ fn read(text: &str, faults: &mut Vec<Fault>) -> BhTable {
     }
     if order.is_none() {
         faults.push(
-            Fault::error("", "the table is empty")
-                .help("begin with the line b_t,h_a_per_m, then one row a point: B in T, H in A/m"),
+            Fault::error("", "the table is empty").help(
+                "begin with the line b_t,h_a_per_m, then one row per point: B in T, H in A/m",
+            ),
         );
     } else if table.b_t.is_empty() && faults.is_empty() {
         let fault = Fault::error("", "the table has a header but no rows");
-        faults.push(fault.help("add one row a point, beginning with 0,0"));
+        faults.push(fault.help("add one row per point, beginning with 0,0"));
     }
     table
 }
@@ -306,14 +307,14 @@ mod tests {
             assert_eq!(
                 said(text),
                 [
-                    "s.csv: error: the table is empty (begin with the line b_t,h_a_per_m, then one row a point: B in T, H in A/m)"
+                    "s.csv: error: the table is empty (begin with the line b_t,h_a_per_m, then one row per point: B in T, H in A/m)"
                 ]
             );
         }
         assert_eq!(
             said("b_t,h_a_per_m\n"),
             [
-                "s.csv: error: the table has a header but no rows (add one row a point, beginning with 0,0)"
+                "s.csv: error: the table has a header but no rows (add one row per point, beginning with 0,0)"
             ]
         );
     }

@@ -189,7 +189,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ("cooling.ambient_c", "temperature of the air"),
     (
         "cooling.winding_max_c",
-        "temperature that the wire's insulation stands for long",
+        "temperature that the wire's insulation withstands continuously",
     ),
     (
         "cooling.heating_s",

@@ -22,7 +22,7 @@ fn entries() -> BTreeMap<String, String> {
             .unwrap_or_else(|| panic!("{PAGE}: not \"- `name` - what it is\": {line}"));
         assert!(what.len() > 10, "{PAGE}: {name} needs a line of its own");
         let before = found.insert(name.to_owned(), what.to_owned());
-        assert!(before.is_none(), "{PAGE}: {name} stands there twice");
+        assert!(before.is_none(), "{PAGE}: {name} is there twice");
     }
     assert!(!found.is_empty(), "{PAGE} has no entries");
     found

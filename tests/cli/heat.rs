@@ -36,7 +36,7 @@ fn the_steady_temperature_balances_heat_and_loss() {
     assert!((made_w / lost_w - 1.0).abs() < 1e-12, "{made_w} {lost_w}");
     assert!(of("/heat/after_c") < steady_c && of("/heat/winding_max_s") > 45.0);
     let text = place.run(&["evaluate", "air.toml"]).ends(0).out;
-    assert!(text.contains("no continuous mode"), "{text}");
+    assert!(text.contains("not for continuous operation"), "{text}");
 }
 
 /// Static rendering was never said to burn the coils.

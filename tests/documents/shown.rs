@@ -117,7 +117,7 @@ fn the_table_of_numbers_is_what_the_commands_print() {
 }
 
 fn one_command_of_a_section_prints_what_is_shown() {
-    for title in ["Find the best coil", "Compare with a Gauss-meter scan"] {
+    for title in ["Find the best coil", "Compare with a gaussmeter scan"] {
         let (command, shown) = command_and_output(title);
         let printed = printed(&arguments(&command, &[], Path::new("")));
         assert_eq!(lasting(&shown), lasting(&printed), "{title}");

@@ -101,7 +101,7 @@ fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
                 "archive",
                 "lies outside the file",
                 "compressed",
-                "stands there twice",
+                "is there twice",
             ];
             let form = form.iter().any(|words_of| words.contains(words_of));
             assert!(

@@ -23,7 +23,7 @@ pub enum Mode {
     /// The best of those that have whole layers and turns.
     #[serde(rename = "optimize-wound")]
     OptimizeWound,
-    /// The array that is felt best over the plan's shapes.
+    /// The array that renders the plan's shapes best.
     #[serde(rename = "optimize-for")]
     OptimizeFor,
 }

@@ -99,7 +99,7 @@ pub struct IronRow {
     pub peak_field_t: f64,
 }
 
-/// The array that is felt best within a design's limits.
+/// The array that renders the shapes best within a design's limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArrayRow {
     /// Geometric mean of its force constants over those of the design as given.

@@ -1,4 +1,4 @@
-//! The array that is felt best: coil, core, wire and positions together, within the design's limits.
+//! The array that renders the shapes best: coil, core, wire and positions together, within the design's limits.
 //!
 //! [`space::Space`] turns numbers into designs, [`problem::ArrayProblem`] judges them by the one table
 //! of limits, `numerics::mixed_search` finds the best; what the force constants are is asked of a

@@ -1,3 +1,5 @@
+//! Air coils: slopes, references, brute force, limits.
+
 use super::air::AirCoil;
 use super::problem::{Problem, Regime};
 use super::sqp::Smooth;

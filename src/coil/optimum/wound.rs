@@ -1,4 +1,4 @@
-//! The best coil that can be wound: whole layers, whole turns a layer, any bore.
+//! The best coil that can be wound: whole layers, whole turns per layer, any bore.
 //!
 //! OD = ID + 2 n d and L = m d. Coils in air are bounded by interval arithmetic (`bounded_coils`), cored
 //! ones by cheaper models (`screened_coils`), and searched through best first (`best_first`).

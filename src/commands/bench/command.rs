@@ -102,7 +102,7 @@ impl Bench {
             design,
             inputs,
             shapes: &shapes,
-            lambda: self.criterion.options(tolerance),
+            lambda: self.criterion.options(None, tolerance),
             max_deviation_m: self.max_deviation,
             quick: self.quick,
             out,

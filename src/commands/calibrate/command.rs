@@ -25,7 +25,7 @@ use crate::cli::start::begin;
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
-use crate::commands::lambda::command::{CriterionFlags, costs_of, rendered, well_placed};
+use crate::commands::lambda::command::{AtFlag, CriterionFlags, costs_of, rendered, well_placed};
 use crate::design::Need;
 use crate::scene::cached_field::SteelPart;
 use crate::scene::cost::{Components, of_map, of_steel};
@@ -33,7 +33,7 @@ use crate::scene::shard::Shard;
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::ErrorTarget;
 
-/// The main job: maps, points, force constant and currents, one bundle a shape
+/// The main job: maps, points, force constant and currents, one bundle per shape
 ///
 /// For every shape: samples its surface, finds the force constant and the static currents from
 /// forces computed at its points, tabulates the part of the maps that the object needs, and writes
@@ -68,7 +68,7 @@ pub struct Calibrate {
     /// How far from the object's points the maps reach within the workspace, like 2cm.
     #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
-    /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
+    /// Compute the field of coils and steel again, and remove what earlier runs cached of it in
     /// OUT/<design>/.fluxform-cache
     #[arg(long, hide_short_help = true)]
     no_cache: bool,
@@ -103,6 +103,8 @@ pub struct Calibrate {
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
+    at: AtFlag,
+    #[command(flatten)]
     requested: ForceFlags,
     #[command(flatten)]
     uncertain: UncertaintyFlags,
@@ -131,7 +133,7 @@ impl Calibrate {
             weights: self.weights.weights,
             error: self.error.target(),
             default_error: Some(ErrorTarget::DEFAULT),
-            ..self.criterion.options(self.tolerance.tolerance)
+            ..self.criterion.options(self.at.at, self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
             &self.design,

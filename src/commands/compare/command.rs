@@ -40,7 +40,7 @@ pub struct Compare {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// Two or more shape files (TOML, `-` for standard input) or surfaces (STL)
+    /// Two or more shape files (TOML, `-` for standard input) or surfaces (STL, ...)
     #[arg(value_name = "SHAPE", required = true, num_args = 2..)]
     shapes: Vec<FileArgument>,
     /// Render every object at this force constant, N/m, instead of its own

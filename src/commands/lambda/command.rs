@@ -55,11 +55,13 @@ pub struct Lambda {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// Shape file (TOML, `-` for standard input) or the surface itself (STL)
+    /// Shape file (TOML, `-` for standard input) or the surface itself (STL, OBJ, PLY, 3MF, STEP, ...)
     #[arg(value_name = "SHAPE")]
     shape: FileArgument,
     #[command(flatten)]
     criterion: CriterionFlags,
+    #[command(flatten)]
+    at: AtFlag,
     #[command(flatten)]
     wiring: WiringFlags,
     #[command(flatten)]
@@ -125,6 +127,11 @@ struct FeedbackFlags {
     #[arg(long, hide_short_help = true, value_name = "FROM,TO", requires = "feedback",
           value_parser = values::distances, allow_hyphen_values = true)]
     two_fingers: Option<values::Ends>,
+    /// With --feedback: angle between forces that a finger just notices, like 25deg: how static currents for a
+    /// force vector weigh sideways errors [default: the shape file's `direction_jnd_deg`, or 25]
+    #[arg(long, hide_short_help = true, value_name = "ANGLE", requires = "feedback",
+          value_parser = values::direction_jnd, allow_hyphen_values = true)]
+    direction_jnd: Option<f64>,
 }
 
 /// How the force constant is chosen.
@@ -135,25 +142,25 @@ pub struct CriterionFlags {
           value_parser = values::named::<Criterion>())]
     criterion: Criterion,
     /// Just-noticeable difference: the error that saturation may add, relative to the rms force, like 7%;
-    /// by-force: 7% as measured at 2.5 to 10 N, or 15% for less than 0.5 N, where 15 to 27% are found
+    /// by-force: 7% as measured at 2.5 to 10 N, or 15% for less than 0.5 N, where 15 to 27% were measured
     #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = Jnd::default(),
           value_parser = values::jnd_or_by_force, allow_hyphen_values = true)]
     jnd: Jnd,
-    /// Angle between forces that a finger just notices, like 25deg: how static currents for a force vector
-    /// weigh sideways errors [default: the shape file's `direction_jnd_deg`, or 25]
-    #[arg(long, hide_short_help = true, value_name = "ANGLE", value_parser = values::direction_jnd,
-          allow_hyphen_values = true)]
-    direction_jnd: Option<f64>,
+}
+
+/// A force constant beside the chosen one.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct AtFlag {
     /// Report currents and errors at this force constant too, N/m
     #[arg(long, hide_short_help = true, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
-    at: Option<f64>,
+    pub at: Option<f64>,
 }
 
 impl CriterionFlags {
-    /// The settings that the flags ask for.
+    /// The settings that the flags request.
     #[must_use]
-    pub fn options(self, tolerance: Option<f64>) -> LambdaOptions {
+    pub fn options(self, at_n_per_m: Option<f64>, tolerance: Option<f64>) -> LambdaOptions {
         LambdaOptions {
             settings: Settings {
                 criterion: self.criterion,
@@ -161,11 +168,10 @@ impl CriterionFlags {
                     Jnd::Part(part) => part,
                     Jnd::ByForce => FORCE_JND,
                 },
-                at_n_per_m: self.at,
+                at_n_per_m,
             },
             jnd_by_force: self.jnd == Jnd::ByForce,
             tolerance,
-            direction_jnd_deg: self.direction_jnd,
             ..LambdaOptions::default()
         }
     }
@@ -194,7 +200,8 @@ impl Lambda {
             picture: self.plot.is_some(),
             force: self.requested.into(),
             uncertainty: self.uncertain.into(),
-            ..self.criterion.options(self.tolerance.tolerance)
+            direction_jnd_deg: self.feedback.direction_jnd,
+            ..self.criterion.options(self.at.at, self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
             &self.design,

@@ -24,8 +24,8 @@ use crate::design::Need;
 /// Seeks inner diameter, outer diameter and length of the winding, and the wire among
 /// wire.choices_mm, so that the force on the magnet at the target height is largest within the
 /// design's [limits], at the rated current: the driver's, or what the supply's voltage lets through
-/// if that is less. The winding is full; with --wound it has whole layers and whole turns a layer.
-/// The design's [coil], if it has one, is a starting point and is compared with what was found.
+/// if that is less. The winding is full; with --wound it has whole layers and whole turns per layer.
+/// The design's [coil], if it has one, is a starting point and is compared with the result.
 /// A certificate says how sure it is that no coil within the limits is better. The sensitivity
 /// of a limit is the force that one unit more of it would give.
 #[derive(Debug, Args)]
@@ -36,13 +36,13 @@ use crate::design::Need;
     ("fluxform optimize designs/seed_air.toml --fix inner_diameter_mm --format json",
      "with the bore as it is, for a program"),
     ("fluxform optimize designs/seed_air.toml --for shapes/flat.toml --vary coil.length_mm=60:90",
-     "the array that is felt best over a plane, of coils 60 to 90 mm long"),
+     "the array that renders a plane best, of coils 60 to 90 mm long"),
 ]), mut_arg("unit", |unit| unit.hide_short_help(true)))]
 pub struct Optimize {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// Whole layers and whole turns a layer
+    /// Whole layers and whole turns per layer
     #[arg(long)]
     wound: bool,
     /// Among the array's other coils: their unpowered cores count for force and settling of the

@@ -41,7 +41,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
 /// steel is not part of them. With --format json the same columns come as arrays of one JSON
 /// object.
 ///
-/// With --compare a Gauss-meter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
+/// With --compare a gaussmeter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
 /// bx_t, by_t, bz_t, dbx_dx_t_per_m to dbz_dz_t_per_m, and the currents that flowed, either as coil
 /// and current_a or as current_0_a, current_1_a and so on. Reported are the residuals, the scale of each
 /// coil with the line for `[array] gain`, a constant background, the pose of the sensor's frame, and
@@ -55,7 +55,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
     ("printf 'x_m,y_m,z_m\\n0,0.01,0.03\\n' | fluxform probe designs/seed.toml - --magnet-force",
      "the force on the magnet there too"),
     ("fluxform probe designs/seed_air.toml --compare designs/scan_example.csv --noise-t 2e-6",
-     "a Gauss-meter's scan against the design"),
+     "a gaussmeter's scan against the design"),
 ]))]
 pub struct Probe {
     /// Design file (TOML), `-` for standard input

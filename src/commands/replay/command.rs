@@ -73,7 +73,7 @@ pub struct Replay {
     /// How long the trajectory made up lasts, seconds
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 10.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     duration: f64,
-    /// Positions a second of the trajectory made up
+    /// Positions per second of the made-up trajectory
     #[arg(long, hide_short_help = true, value_name = "HZ", default_value_t = 50.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     rate: f64,
     /// Write the trajectory made up to this file too

@@ -49,7 +49,7 @@ pub struct Synthesis {
     pub seed: u64,
     /// s.
     pub duration_s: f64,
-    /// Positions a second.
+    /// Positions per second.
     pub rate_hz: f64,
 }
 

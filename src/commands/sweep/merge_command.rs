@@ -24,7 +24,7 @@ use crate::cli::values::{self, FileArgument};
 
 /// Join the points of a plan into one table, and plot the best designs
 ///
-/// Writes one row a point, in the order of the plan, to a CSV table; beside it NAME.svg, force
+/// Writes one row per point, in the order of the plan, to a CSV table; beside it NAME.svg, force
 /// against resistance, mass and settling time with the designs that no other one beats,
 /// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
 /// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
@@ -231,7 +231,7 @@ fn strongest(best: &StrongestDesign) -> String {
     let (achieved, strongest) = match best.gain {
         Some(gain) => (
             format!("{} times the given array", number(gain)),
-            "felt best",
+            "the best for the shapes",
         ),
         None => (force(best.force_n), "the strongest"),
     };

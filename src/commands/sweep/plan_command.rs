@@ -57,13 +57,13 @@ pub struct Plan {
     /// the coil as given
     #[arg(long)]
     optimize: bool,
-    /// With --optimize: whole layers and whole turns a layer
+    /// With --optimize: whole layers and whole turns per layer
     #[arg(long, requires = "optimize")]
     wound: bool,
-    /// Search the array that is felt best over these shapes, as `optimize --for` does
+    /// Search the array that renders these shapes best, as `optimize --for` does
     #[arg(long = "for", value_name = "SHAPE", num_args = 1.., conflicts_with = "optimize")]
     shapes: Vec<PathBuf>,
-    /// With --for: most arrays that are computed for each design
+    /// With --for: most arrays that the search of each design computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,

@@ -128,7 +128,7 @@ impl<'a> Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// The array that is felt best.
+    /// The array that renders the shapes best.
     fn array(&self, design: Design, text: String, index: u64) -> Result<Computed, RunError> {
         let tolerance = self.plan.tolerance;
         let (design, text) = settling_in_array(design, text, self.path, tolerance)?;

@@ -712,7 +712,7 @@ def _entries(content):
         if zlib.crc32(data) != crc:
             raise BundleError(f"map.npz: {name!r} is damaged (CRC)")
         if name in entries:
-            raise BundleError(f"map.npz: {name!r} stands there twice")
+            raise BundleError(f"map.npz: {name!r} is there twice")
         entries[name] = data
     if at != end:
         raise damaged

@@ -36,11 +36,11 @@ use crate::scene::cost;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The whole array, for shapes")]
 pub struct ArrayFlags {
-    /// Shapes over which the array is to be felt best: coil, core, wire and positions together, as
+    /// Shapes that the array is to render best: coil, core, wire and positions together, as
     /// far as [search] or --vary says
     #[arg(long = "for", value_name = "SHAPE", num_args = 1..)]
     pub shapes: Vec<FileArgument>,
-    /// Vary a key besides those of [search]: KEY=FROM:TO or KEY=A,B,C, like array.pitch_mm=40:60
+    /// Vary a key in addition to those of [search]: KEY=FROM:TO or KEY=A,B,C, like array.pitch_mm=40:60
     #[arg(long, value_name = "KEY=VALUES", requires = "shapes")]
     pub vary: Vec<String>,
     /// The force constant that is made large
@@ -59,7 +59,7 @@ pub struct ArrayFlags {
     /// Make the smallest of the shapes' gains large, not their mean
     #[arg(long, hide_short_help = true, requires = "shapes")]
     pub smallest: bool,
-    /// Most arrays that the search computes
+    /// Most arrays that the search computes; what limits and trade-offs around the best are worth takes more
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
     pub evaluations: usize,
     /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); every number of coils is

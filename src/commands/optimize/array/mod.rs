@@ -1,4 +1,4 @@
-//! `optimize --for`: the array that is felt best over given shapes.
+//! `optimize --for`: the array that renders given shapes best.
 
 pub(crate) mod command;
 mod page;

@@ -43,7 +43,10 @@ pub fn html(result: &ArrayOptimization) -> String {
     ];
     Page {
         kind: "Optimisation",
-        title: format!("The array of {} that is felt best", result.design),
+        title: format!(
+            "The array of {} that renders the shapes best",
+            result.design
+        ),
         lead,
         sections: sections.into_iter().flatten().collect(),
         data: Value::Object(Map::new()),

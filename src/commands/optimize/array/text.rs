@@ -14,16 +14,15 @@ pub fn summary(
     out: Option<&FileArgument>,
     seconds: &[(String, f64)],
 ) -> String {
-    let mut sheet = Sheet::new(&format!("{}: the array that is felt best", result.design));
-    let whole = if result.shapes.len() == 1 {
-        ""
-    } else {
-        result.objective
+    let mut sheet = Sheet::new(&format!(
+        "{}: the array that renders the shapes best",
+        result.design
+    ));
+    let given = match &*result.shapes {
+        [_] => "that of the given design".to_owned(),
+        _ => format!("the given design's {}", result.objective),
     };
-    sheet.line(
-        "gain",
-        &format!("{} times the given design's {whole}", number(result.gain)),
-    );
+    sheet.line("gain", &format!("{} times {given}", number(result.gain)));
     sheet.line("ended", &ended(result));
     if let Some(FileArgument::Path(path)) = out {
         sheet.line("written to", &path.display().to_string());

@@ -29,7 +29,7 @@ const EXPLANATIONS: usize = 8;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "A measured scan")]
 pub struct ScanFlags {
-    /// Hold this Gauss-meter's scan against the design (CSV; `-` for standard input)
+    /// Hold this gaussmeter's scan against the design (CSV; `-` for standard input)
     #[arg(long, value_name = "SCAN", conflicts_with = "points")]
     pub compare: Option<FileArgument>,
     /// Parameters to fit: any of scale, background, position, rotation

@@ -1,4 +1,4 @@
-//! `probe --compare`: a Gauss-meter scan held against a design.
+//! `probe --compare`: a gaussmeter scan held against a design.
 //!
 //! The residuals of the design as it is; scales of the coils, a background and the sensor's
 //! frame fitted all at once, with standard errors; and which single parameter would explain the

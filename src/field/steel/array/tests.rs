@@ -1,3 +1,5 @@
+//! Panels between cores, whole grids against few dipoles and patterns.
+
 use super::*;
 use crate::components::Components;
 

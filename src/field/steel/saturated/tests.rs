@@ -1,3 +1,5 @@
+//! Linear limit, energy against flux, saturation, convergence for any curve and current.
+
 use super::*;
 use crate::steel::CoreShape;
 use crate::steel::bh_curve::BhCurve;

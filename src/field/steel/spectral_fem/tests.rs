@@ -1,3 +1,5 @@
+//! Harmonic, Bessel and manufactured solutions, Taylor test of the tangent, convergence with the degree.
+
 use super::*;
 use crate::steel::permeability::Froehlich;
 

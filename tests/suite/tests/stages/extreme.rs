@@ -12,7 +12,7 @@ fn there_are_many_cases_with_names_of_their_own() {
     let cases = cases();
     assert!(cases.len() >= 150, "{} cases", cases.len());
     let names: BTreeSet<&str> = cases.iter().map(|case| case.name).collect();
-    assert_eq!(names.len(), cases.len(), "a name stands there twice");
+    assert_eq!(names.len(), cases.len(), "a name is there twice");
     for case in &cases {
         assert!(case.bound >= 0.0 && case.bound <= 1.0, "{}", case.name);
         assert!(case.expected.len() > 10, "{}", case.name);
