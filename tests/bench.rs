@@ -116,6 +116,16 @@ fn errors_of_a_cored_coil_fall_with_their_knobs() {
     errors_fall(CORE);
 }
 
+/// Regression: runs by the force's own difference were held against a reference by 7 %.
+#[test]
+fn the_reference_has_the_just_noticeable_difference_of_the_runs() {
+    let place = place(ARRAY);
+    let faint = |jnd| measured(&place, &[&ASKED[..], &["--jnd", jnd, "--force"]].concat());
+    let [by_force, given] =
+        ["by-force", "15%"].map(|jnd| faint(jnd).shapes[0].reference.lambda_n_per_m);
+    assert_eq!(by_force, given);
+}
+
 #[test]
 fn the_cheapest_settings_meet_their_target_and_can_be_pasted() {
     let place = place(ARRAY);

@@ -155,6 +155,9 @@ impl Drive {
     /// Voltages are held for short parts of the step, such that the currents at the end of each are
     /// those of the loop: exact where no voltage is at its bound, else of first order in the part.
     pub fn track(&mut self, command_a: &[f64], step_s: f64, bandwidth_hz: f64) {
+        if step_s <= 0.0 {
+            return;
+        }
         let coils = self.root_ohm.len();
         let pace = std::f64::consts::TAU * bandwidth_hz;
         let parts = (step_s * pace / PART).ceil().clamp(1.0, MOST_PARTS);
@@ -265,6 +268,11 @@ mod tests {
         let mut now = [0.0];
         drive.currents(&mut now);
         assert!((now[0] / 1.7 - 1.0).abs() < 5e-3, "{now:?}");
+        // Regression: in no time currents were not a number.
+        let before = now;
+        drive.track(&[0.7], 0.0, 1e4);
+        drive.currents(&mut now);
+        assert_eq!(now, before);
         // The loop's own currents never pass the voltage's.
         drive.track(&[9.0], 3.0, 1e3);
         drive.currents(&mut now);

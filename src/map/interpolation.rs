@@ -20,6 +20,8 @@ pub struct InterpolationError {
 /// Samples find the largest error but for this factor: the cubic's error peaks within a few
 /// percent of the middle of a cell, and the samples lie in the middles of cells, faces and edges.
 const SAFETY: f64 = 1.25;
+/// From this error on the nodes resolve no peak, and samples say little of the places between them: twice it is stated.
+const UNRESOLVED: f64 = 0.25;
 
 /// The relative error falls as the fourth power of the step over the height: the lowest cells
 /// decide, and the highest because its stencil is one-sided.
@@ -89,7 +91,7 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
 
 /// Compares interpolated components (each [coil, z, y, x] on `grid`) with direct values in the
 /// middle of cells, faces and edges, in the four lowest layers and the highest, for
-/// the innermost and the outermost coil: an error for each component, relative to its own largest value
+/// a few coils that differ in where their axes lie: an error for each component, relative to its own largest value
 /// at the height.
 ///
 /// # Errors
@@ -102,7 +104,7 @@ pub fn interpolation_errors_by(
 ) -> Result<Vec<InterpolationError>, MapError> {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let nodes = x.len() * y.len() * z.len();
-    let watched = innermost_and_outermost(coils, grid);
+    let watched = watched(coils, grid);
     let placed: Vec<PlacedCoil> = watched.iter().map(|coil| coils[*coil]).collect();
     let nothing = InterpolationError {
         largest: 0.0,
@@ -141,25 +143,63 @@ pub fn interpolation_errors_by(
             }
         }
     }
+    for error in &mut all {
+        if error.largest > UNRESOLVED {
+            error.largest *= 2.0;
+        }
+    }
     Ok(all)
 }
 
-/// The coils nearest to the grid's centre and farthest from it, by index: the coils are alike,
-/// and its place decides whether its peak falls on inner cells or on the border's.
-fn innermost_and_outermost(coils: &[PlacedCoil], grid: &Grid) -> Vec<usize> {
+/// The coils nearest to the grid's centre and farthest from it, by index, and those whose axes are nearest to a node
+/// of the plan and to the middle of a cell: the coils are alike, and its place decides whether its peak falls on inner
+/// cells or on the border's, on nodes or between them.
+fn watched(coils: &[PlacedCoil], grid: &Grid) -> Vec<usize> {
     let middle = |nodes: &[f64]| 0.5 * (nodes[0] + nodes[nodes.len() - 1]);
     let (cx, cy) = (middle(&grid.x_m), middle(&grid.y_m));
     let distance = |coil: &PlacedCoil| (coil.axis_m[0] - cx).hypot(coil.axis_m[1] - cy);
-    let mut order: Vec<usize> = (0..coils.len()).collect();
-    order.sort_by(|a, b| distance(&coils[*a]).total_cmp(&distance(&coils[*b])));
-    let mut ends: Vec<usize> = order
-        .first()
-        .into_iter()
-        .chain(order.last())
-        .copied()
-        .collect();
-    ends.dedup();
-    ends
+    let off_nodes = |coil: &PlacedCoil| {
+        let [x, y] = coil.axis_m;
+        off_node(&grid.x_m, x) + off_node(&grid.y_m, y)
+    };
+    // Alike but for rounding: the one that is watched already.
+    let nearly = |share: f64| (share * 1e6).round();
+    let least_and_most = |score: &dyn Fn(&PlacedCoil) -> f64| {
+        let order = |a: &usize, b: &usize| score(&coils[*a]).total_cmp(&score(&coils[*b]));
+        [
+            (0..coils.len()).min_by(order),
+            (0..coils.len()).max_by(order),
+        ]
+    };
+    let ends = least_and_most(&distance).into_iter().flatten();
+    let mut all: Vec<usize> = ends.collect();
+    all.dedup();
+    let score = |coil: &PlacedCoil| nearly(off_nodes(coil));
+    for extreme in least_and_most(&score).into_iter().flatten() {
+        if !all
+            .iter()
+            .any(|k| score(&coils[*k]) == score(&coils[extreme]))
+        {
+            all.push(extreme);
+        }
+    }
+    all
+}
+
+/// How far `place` is from the nearest of `nodes`, in the cell's width: 0 on a node, 1/2 in the middle of a cell; of a
+/// place beside them as if they went on.
+fn off_node(nodes: &[f64], place: f64) -> f64 {
+    let [.., before, last] = nodes else {
+        return 0.0;
+    };
+    let above = nodes.partition_point(|node| *node <= place);
+    let (from, width) = match (above.checked_sub(1), nodes.get(above)) {
+        (Some(below), Some(next)) => (nodes[below], next - nodes[below]),
+        (None, _) => (nodes[0], nodes[1] - nodes[0]),
+        (Some(_), None) => (*last, last - before),
+    };
+    let cells = (place - from) / width;
+    (cells - cells.round()).abs()
 }
 
 /// One height of a tensor-product interpolation: along z, then y, then x.

@@ -14,8 +14,14 @@ use crate::progress::Silent;
 const SAFETY: f64 = 30.0;
 /// Least estimate: what rounding may do, sampled or not.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// Places at which values are compared.
-pub(crate) const PLACES: usize = 48;
+/// Places at which values are compared, of all of them.
+const PLACES: usize = 48;
+/// Places at which values are compared above and beside the winding.
+const NEAR_PLACES: usize = 192;
+/// Up to this multiple of the winding's outer radius from the axis: the quadratures lose most there.
+const NEAR: f64 = 1.5;
+/// Values among which those places are looked for.
+const LOOKED_AT: usize = 20_000;
 
 /// A value of dB_z/dz per ampere to be compared.
 pub(crate) struct Sample {
@@ -68,6 +74,30 @@ pub(crate) fn sharper(
             proven.estimate, proven.method
         ),
     }
+}
+
+/// Which of `count` values are compared, `r_m` being the distance of each from the axis of its coil: some of all,
+/// and some of those near the winding, or the nearest where few are. None where nothing is to compare them with.
+pub(crate) fn compared(
+    scene: &Scene,
+    solved: &Solved,
+    count: usize,
+    r_m: impl Fn(usize) -> f64,
+) -> Vec<usize> {
+    if solved.steel().direct(&scene.winding).is_none() {
+        return Vec::new();
+    }
+    let mut looked_at = spread(count, LOOKED_AT);
+    let within_m = NEAR * scene.winding.outer_radius_m;
+    let is_near = |index: &usize| r_m(*index) <= within_m;
+    let mut near: Vec<usize> = looked_at.iter().copied().filter(is_near).collect();
+    if near.len() < PLACES {
+        looked_at.sort_by(|a, b| r_m(*a).total_cmp(&r_m(*b)));
+        looked_at.truncate(PLACES);
+        near = looked_at;
+    }
+    let near = spread(near.len(), NEAR_PLACES).into_iter().map(|k| near[k]);
+    spread(count, PLACES).into_iter().chain(near).collect()
 }
 
 /// Tolerance of the forces that others are compared with, in that of these.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
+use super::evaluation_sample::{Evaluation, Sample, compared, sharper};
 use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
 use super::{AIR_SHARE, Scene, coupled};
 use crate::RunError;
@@ -87,7 +87,12 @@ impl SceneMap {
         };
         let mut evaluation = evaluation(&map, solved);
         if magnet.is_field() {
-            evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
+            evaluation = sharper(
+                scene,
+                solved,
+                samples(scene, solved, &map, coils),
+                evaluation,
+            );
         }
         let accuracy = accuracy(evaluation, solved, magnet.bound);
         Ok(Self {
@@ -552,23 +557,22 @@ fn every_node(grid: &Grid) -> Vec<[f64; 3]> {
     grid.z_m.iter().flat_map(lifted).collect()
 }
 
-/// Nodes of a map to be compared: every second one of the lowest plane.
-fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
-    let (nx, ny) = (map.x_m.len(), map.y_m.len());
-    let plane = nx * ny;
-    spread(map.gz_t_per_m_per_a.len(), PLACES)
+/// Nodes of a map to be compared.
+fn samples(scene: &Scene, solved: &Solved, map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
+    let (nx, ny, nz) = (map.x_m.len(), map.y_m.len(), map.z_m.len());
+    let of = |index: usize| &coils[index / (nx * ny * nz)];
+    let r_m = |index: usize| {
+        let [x_m, y_m] = of(index).axis_m;
+        (map.x_m[index % nx] - x_m).hypot(map.y_m[index / nx % ny] - y_m)
+    };
+    compared(scene, solved, map.gz_t_per_m_per_a.len(), r_m)
         .into_iter()
-        .enumerate()
-        .filter_map(|(sample, index)| {
-            let whole = plane * map.z_m.len();
-            let (coil, at) = (index / whole, index % whole);
-            let at = if sample % 2 == 0 { at % plane } else { at };
-            let (x_m, y_m) = (map.x_m[at % nx], map.y_m[at / nx % ny]);
-            let PlacedCoil { axis_m, gain, .. } = coils[coil];
+        .filter_map(|index| {
+            let gain = of(index).gain;
             (gain != 0.0).then(|| Sample {
-                r_m: (x_m - axis_m[0]).hypot(y_m - axis_m[1]),
-                z_m: map.z_m[at / plane],
-                gz: map.gz_t_per_m_per_a[coil * whole + at] / gain,
+                r_m: r_m(index),
+                z_m: map.z_m[index / (nx * ny) % nz],
+                gz: map.gz_t_per_m_per_a[index] / gain,
             })
         })
         .collect()

@@ -470,3 +470,119 @@ fn the_range_of_the_just_noticeable_difference_is_said() {
         assert!(!text(other).contains("measured at"), "{other:?}");
     }
 }
+
+/// A row of points below which coils of a square mirror each other.
+const ROW: &str = "name = \"row\"\nprimitive = \"half-cylinder\"\nradius_mm = 50.0\nlength_mm = 100.0\n\
+                   base_mm = 30.0\n[points]\nx_mm = [0.0, 0.0, 1]\ny_mm = [-50.0, 50.0, 61]\n";
+
+/// Regression: rounding told two columns apart that mirror each other, and lambda_linear was half of what it is.
+#[test]
+fn coils_that_mirror_each_other_at_every_point_share_the_current() {
+    let place = Place::new();
+    place.write(
+        "square.toml",
+        "name = \"square\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\nlength_mm = 100.0\n\
+         [wire]\ndiameter_mm = 0.7\n[core]\n[array]\nrows = 2\ncolumns = 2\npitch_mm = 50.0\n[supply]\n\
+         current_max_a = 2.0\n",
+    );
+    place.write("row.toml", ROW);
+    let linear = |tolerance: &str| {
+        let arguments = [
+            "lambda",
+            "square.toml",
+            "row.toml",
+            "--tolerance",
+            tolerance,
+        ];
+        let report = place
+            .run(&[&arguments[..], &["--format", "json"]].concat())
+            .ends(0)
+            .json();
+        report["lambda_linear_n_per_m"].as_f64().unwrap()
+    };
+    let finest = linear("1e-5");
+    for tolerance in ["1e-3", "1e-4", "3e-5"] {
+        assert!(
+            (linear(tolerance) / finest - 1.0).abs() < 1e-2,
+            "{tolerance}"
+        );
+    }
+}
+
+/// Regression: currents of 1e15 A were read off the worst point's path, with an error of 1e15 of the force.
+#[test]
+fn a_worst_point_path_that_rounding_leads_astray_gives_no_numbers() {
+    let place = Place::new();
+    place.write(
+        "close.toml",
+        "name = \"close\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 30\nlength_mm = 30\n[wire]\n\
+         diameter_mm = 0.7\n[array]\nrows = 3\ncolumns = 3\npitch_mm = 30.0\n[supply]\ncurrent_max_a = 2.0\n\
+         current_min_a = -2.0\n",
+    );
+    let shape = |points: usize| {
+        format!(
+            "name = \"line\"\nprimitive = \"flat\"\nside_mm = 36.0\nheight_mm = 22\n[points]\n\
+             x_mm = [-18.0, 18.0, {points}]\ny_mm = [0, 0, 1]\n"
+        )
+    };
+    for points in [12, 13, 15] {
+        place.write("line.toml", &shape(points));
+        let report = place
+            .run(&["lambda", "close.toml", "line.toml", "--format", "json"])
+            .ends(0)
+            .json();
+        let worst = &report["worst_point"];
+        let linear = worst["lambda_linear_n_per_m"].as_f64().unwrap();
+        let jnd = worst["lambda_jnd_n_per_m"].as_f64().unwrap();
+        assert!(
+            (linear - 0.83).abs() < 0.03 && (jnd - 3.5).abs() < 0.03,
+            "{points}: {linear} {jnd}"
+        );
+        let estimate = report["accuracy"]["worst_point"]["estimate"]
+            .as_f64()
+            .unwrap();
+        assert!(estimate < 1e-6, "{points}: {estimate:e}");
+    }
+}
+
+#[test]
+fn random_points_over_a_row_are_refused_with_a_reason() {
+    let place = Place::new();
+    place.write("row.toml", ROW);
+    let arguments = [
+        "lambda",
+        "designs/seed_air.toml",
+        "row.toml",
+        "--poisson",
+        "2mm",
+    ];
+    let refused = place.run(&arguments).ends(3);
+    refused.says(&["random points count by area"]);
+}
+
+/// Regression: `compare` counted all points alike, whatever a shape says, on a grid that `lambda` would not choose.
+#[test]
+fn compare_renders_the_constants_that_lambda_reports() {
+    let place = Place::new();
+    let wedge = "primitive = \"wedge\"\nside_mm = 80.0\nlow_mm = 30.0\nhigh_mm = 60.0\n";
+    let points = "[points]\nx_mm = [-40, 40, 9]\ny_mm = [-40, 40, 9]\n";
+    place.write("equal.toml", &format!("name = \"equal\"\n{wedge}{points}"));
+    place.write(
+        "area.toml",
+        &format!("name = \"area\"\n{wedge}{points}weights = \"area\"\n"),
+    );
+    place.write("free.toml", &format!("name = \"free\"\n{wedge}"));
+    let shapes = ["equal.toml", "area.toml", "free.toml"];
+    let arguments = [
+        &["compare", "designs/seed_air.toml"],
+        &shapes[..],
+        &["--format", "json"],
+    ];
+    let compared = place.run(&arguments.concat()).ends(0).json();
+    for (shape, of) in shapes.iter().zip(compared["shapes"].as_array().unwrap()) {
+        let arguments = ["lambda", "designs/seed_air.toml", shape, "--format", "json"];
+        let alone = place.run(&arguments).ends(0).json();
+        let [alone, of] = [&alone, of].map(|of| of["lambda_n_per_m"].as_f64().unwrap());
+        assert!((of / alone - 1.0).abs() < 1e-8, "{shape}: {of} {alone}");
+    }
+}

@@ -192,3 +192,21 @@ fn bounds_beyond_the_map_or_all_sense_are_refused() {
         "larger than the map's reach of 20 mm",
     );
 }
+
+#[test]
+fn a_cap_of_power_without_uncertainties_is_refused() {
+    let place = Place::new();
+    for command in ["lambda", "calibrate"] {
+        let arguments = [
+            command,
+            "designs/seed_air.toml",
+            "shapes/flat.toml",
+            "--power-cap",
+            "5",
+        ];
+        place
+            .run(&arguments)
+            .ends(3)
+            .says(&["--power-cap", "there are none", "--sensor-error"]);
+    }
+}

@@ -210,7 +210,46 @@ const CASES: &[Case] = &[
         &["slope.toml", "--tolerance", "1e-6", "--reach", "3"],
         0,
     ),
+    (
+        "a coarse tolerance in air",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &["shapes/wedge.toml", "--tolerance", "1e-3"],
+        0,
+    ),
+    (
+        "a pull that takes all current there is",
+        [
+            CORE,
+            PAIR,
+            "passive_force = true\n",
+            "current_max_a = 0.01\n",
+        ],
+        &["slope.toml"],
+        4,
+    ),
 ];
+
+/// Regression: the stated error of the map's nodes missed those near the axes, where it is largest.
+#[test]
+fn a_low_map_of_slender_coils_verifies() {
+    let place = Place::new();
+    place.write(
+        "slender.toml",
+        "name = \"slender\"\n[coil]\ninner_diameter_mm = 1.45\nouter_diameter_mm = 6.32\nlength_mm = 37.3\n\
+         [wire]\ndiameter_mm = 0.49\n[array]\npositions_mm = [[-39.5, -36.1], [-28.5, 4.6], [-21.9, -15.2], \
+         [35.9, -24.6], [14.9, 18.3]]\n[workspace]\nx_mm = [-35, 35, 10]\ny_mm = [-28, 33, 6]\n\
+         z_mm = [7.43, 35.95, 7]\n",
+    );
+    place.write(
+        "low.toml",
+        "name = \"low\"\nprimitive = \"flat\"\nside_mm = 60\nheight_mm = 8.43\n[points]\n\
+         x_mm = [-30, 30, 9]\ny_mm = [-30, 30, 9]\n",
+    );
+    place
+        .run(&["calibrate", "slender.toml", "low.toml"])
+        .ends(0);
+    place.run(&["verify", "results/slender/low"]).ends(0);
+}
 
 #[test]
 fn fresh_bundles_verify_whatever_was_requested() {

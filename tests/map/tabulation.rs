@@ -252,8 +252,14 @@ fn a_node_on_an_edge_is_refused_with_its_place() {
 
 #[test]
 fn the_interpolation_error_covers_other_places() {
-    for from in [0.005, 0.02] {
-        let (winding, coils) = (seed(), coils(0.0));
+    // Skewed, axes lie anywhere in their cells.
+    for (from, skew) in [
+        (0.005, 0.0),
+        (0.02, 0.0),
+        (0.005, 0.000_31),
+        (0.02, 0.000_31),
+    ] {
+        let (winding, coils) = (seed(), coils(skew));
         let grid = grid(31, from);
         let map = tabulate(&winding, &coils, &grid, Components::Gz, 1e-9, &Silent).expect("a map");
         let reported = interpolation_error(&winding, &coils, &grid, &map.gz_t_per_m_per_a, 1e-9)

@@ -116,9 +116,11 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
         offset_n,
         weights,
     };
-    let settings = &bench.request.lambda.settings;
     let resistance_ohm = scene.resistances_ohm();
-    let solution = lambda::solve(&all.problem(scene, &resistance_ohm), settings)?;
+    let problem = all.problem(scene, &resistance_ohm);
+    let options = bench.request.lambda.with_jnd_of(&problem)?;
+    let settings = &options.settings;
+    let solution = lambda::solve(&problem, settings)?;
     let lambda_n_per_m = chosen(&solution).ok_or_else(|| {
         RunError::NoForceConstant(format!(
             "{:?} has no force constant in the refined run, so there is nothing to hold errors \
@@ -126,7 +128,6 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
             shape.document.name
         ))
     })?;
-    let problem = all.problem(scene, &resistance_ohm);
     let own_error = points.error_against_limit(
         lambda_n_per_m,
         (&problem, &problem),

@@ -134,7 +134,7 @@ impl<'a> Bench<'a> {
                 };
                 let how = resolving(asked, lowest_m);
                 let report = scattered::run(document, Vec::new(), how, progress)?;
-                Ok(ForcePoints::of_scattered(&report))
+                ForcePoints::of_scattered(&report)
             }
         }
     }

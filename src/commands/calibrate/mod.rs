@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::discretize::{self, OpenedSurface, PointsReport, point_rows, points_grid};
 use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::placement::Placed;
-use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at};
+use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at, uncertain};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
 use crate::RunError;
@@ -240,6 +240,7 @@ pub fn run(
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
     check_reach(source.design, options)?;
+    uncertain::check(&options.lambda, source.design)?;
     let tolerance = options.lambda.tolerance_for(source.design);
     let scene = Scene::with_tolerance(source.design, tolerance)?;
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.

@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::calibrate::requested_force::on_grid;
-use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::proven_accuracy;
+use super::discretize::{PointsReport, point_rows, points_grid};
+use super::lambda::error_target::ErrorTarget;
+use super::lambda::{ForcePoints, LambdaOptions, object_points, proven_accuracy};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -194,6 +195,22 @@ struct RenderedForces {
     saturated: usize,
 }
 
+impl CompareOptions {
+    /// The options by which `lambda` chooses points and force constant alike.
+    fn of_lambda(&self) -> LambdaOptions {
+        LambdaOptions {
+            settings: Settings {
+                criterion: Criterion::Jnd,
+                jnd_weight: self.jnd,
+                at_n_per_m: self.lambda_n_per_m,
+            },
+            tolerance: self.tolerance,
+            default_error: Some(ErrorTarget::DEFAULT),
+            ..LambdaOptions::default()
+        }
+    }
+}
+
 /// Compares every two of `shapes` on `design`.
 ///
 /// # Errors
@@ -211,13 +228,18 @@ pub fn run(
     let inputs: Vec<Input> = std::iter::once(design_input.clone())
         .chain(of_shapes)
         .collect();
+    let of_lambda = options.of_lambda();
     let points = shapes
         .iter()
-        .map(|shape| discretize::run(&shape.document, inputs.clone(), progress))
-        .collect::<Result<Vec<PointsReport>, RunError>>()?;
-    let lowest_m = points
-        .iter()
-        .fold(f64::INFINITY, |z, p| z.min(p.summary.min_height_m));
+        .map(|shape| {
+            let of_shape = of_lambda.for_document(&shape.document);
+            let inputs = inputs.clone();
+            object_points(&scene, &shape.document, inputs, &of_shape, progress)
+        })
+        .collect::<Result<Vec<_>, RunError>>()?;
+    let lowest_m = points.iter().fold(f64::INFINITY, |z, (_, points, _)| {
+        z.min(points.lowest_place_m(&design.workspace))
+    });
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
@@ -225,13 +247,13 @@ pub fn run(
     let objects = points
         .into_iter()
         .zip(shapes)
-        .map(|(points, shape)| {
+        .map(|((points, of_lambda_points, _), shape)| {
             let force = shape.document.force;
             Object::new(
                 &scene,
                 &solved,
-                (points, force),
-                options,
+                (points, of_lambda_points, force),
+                &of_lambda.settings,
                 progress,
                 &mut warnings,
             )
@@ -305,21 +327,20 @@ impl Object {
     fn new(
         scene: &Scene,
         solved: &Solved,
-        (points, force): (PointsReport, RequestedForce),
-        options: &CompareOptions,
+        (points, of_lambda, force): (PointsReport, ForcePoints, RequestedForce),
+        settings: &Settings,
         progress: &dyn Progress,
         warnings: &mut Vec<String>,
     ) -> Result<Self, RunError> {
         let found = &points.discretized.points;
-        let plan = found.x_m.iter().zip(&found.y_m).zip(&found.height_m);
-        let positions_m: Vec<[f64; 3]> = plan.map(|((x, y), z)| [*x, *y, *z]).collect();
         let heights = HeightGrid::of_points(&points_grid(found), &point_rows(found));
         let heights = heights.ok_or_else(|| {
             RunError::Input("the shape's points do not fit their grid".to_owned())
         })?;
-        let forces = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
+        let mut positions_m = of_lambda.positions_m.clone();
+        let mut forces = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
         let upward: Vec<f64> = forces.iter().map(|force| force[2]).collect();
-        let passive_n = if scene.design.magnet.passive_force {
+        let mut passive_n = if scene.design.magnet.passive_force {
             passive::pull(scene, &positions_m, false)?.map(|pull| pull.forces_z_n(&positions_m))
         } else {
             None
@@ -327,26 +348,33 @@ impl Object {
         progress.begin("lambda", 1);
         let problem = ForceProblem {
             forces_n_per_a: &upward,
-            height_m: &found.height_m,
+            height_m: &of_lambda.height_m,
             offset_n: passive_n.as_deref(),
-            weights: None,
+            weights: of_lambda.weights(),
             lower_a: &scene.lower_a,
             upper_a: &scene.upper_a,
             total_max_a: scene.design.supply.total_current_max_a,
             resistance_ohm: &scene.resistances_ohm(),
         };
-        let settings = Settings {
-            criterion: Criterion::Jnd,
-            jnd_weight: options.jnd,
-            at_n_per_m: options.lambda_n_per_m,
-        };
-        let solution = lambda::solve(&problem, &settings)?;
+        let solution = lambda::solve(&problem, settings)?;
         progress.end();
+        let unusual = unusual(solution.status);
+        let rendered = Rendered::of(solution, settings);
+        let none = rendered.is_none() && unusual.is_none();
+        let none = none.then_some(
+            "no force constant by the criterion jnd (`lambda` states why); give one with --lambda",
+        );
         let name = &points.summary.shape;
         let own = points.summary.warnings.iter().map(String::as_str);
-        let all = own.chain(unusual(solution.status));
+        let all = own.chain(unusual).chain(none);
         warnings.extend(all.map(|warning| format!("{name}: {warning}")));
-        let rendered = Rendered::of(solution, options);
+        // Objects are compared at the points of their grids alone.
+        let on_grid_points = found.height_m.len();
+        positions_m.truncate(on_grid_points);
+        forces.truncate(on_grid_points * scene.coils.len());
+        if let Some(passive_n) = &mut passive_n {
+            passive_n.truncate(on_grid_points);
+        }
         Ok(Self {
             direction: on_grid(force, found).map(|requested| requested.direction),
             rendered,
@@ -447,14 +475,16 @@ impl RenderedForces {
 }
 
 impl Rendered {
-    fn of(solution: Solution, options: &CompareOptions) -> Option<Self> {
+    /// `None` also where a limit binds before any force is rendered.
+    fn of(solution: Solution, settings: &Settings) -> Option<Self> {
         // A constant that was given is rendered as well as can be.
-        let point = match options.lambda_n_per_m {
+        let point = match settings.at_n_per_m {
             Some(_) => solution.at,
             None => solution.chosen,
         };
         let able = matches!(solution.status, Status::Solved | Status::Stalled);
-        point.filter(|_| able).map(|point| Self {
+        let point = point.filter(|point| able && point.lambda_n_per_m > 0.0);
+        point.map(|point| Self {
             lambda_n_per_m: point.lambda_n_per_m,
             currents_a: point.currents_a,
         })

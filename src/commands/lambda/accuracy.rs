@@ -4,9 +4,7 @@ use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;
 use crate::field::winding::KERNEL_ERROR;
-use crate::scene::evaluation_sample::{
-    Evaluation, PLACES, Sample, sharper, sharper_forces, spread,
-};
+use crate::scene::evaluation_sample::{Evaluation, Sample, compared, sharper, sharper_forces};
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::MAGNET_FINEST;
 use crate::scene::{AIR_SHARE, MAGNET_SHARE, Scene};
@@ -32,14 +30,18 @@ pub(super) fn forces_accuracy(
     if m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
         return Ok(accuracy_of(scene, solved, proven));
     }
-    let samples = spread(forces_n_per_a.len(), PLACES)
+    let r_m = |index: usize| {
+        let ([x_m, y_m, _], coil) = (points_m[index / coils], &scene.coils[index % coils]);
+        (x_m - coil.axis_m[0]).hypot(y_m - coil.axis_m[1])
+    };
+    let samples = compared(scene, solved, forces_n_per_a.len(), r_m)
         .into_iter()
         .filter_map(|index| {
-            let (coil, [x_m, y_m, z_m]) = (&scene.coils[index % coils], points_m[index / coils]);
-            (coil.gain != 0.0).then(|| Sample {
-                r_m: (x_m - coil.axis_m[0]).hypot(y_m - coil.axis_m[1]),
-                z_m,
-                gz: forces_n_per_a[index] / (coil.gain * m_z),
+            let gain = scene.coils[index % coils].gain;
+            (gain != 0.0).then(|| Sample {
+                r_m: r_m(index),
+                z_m: points_m[index / coils][2],
+                gz: forces_n_per_a[index] / (gain * m_z),
             })
         });
     let estimate = sharper(scene, solved, samples, proven);

@@ -13,7 +13,7 @@ mod points_effect;
 mod result_file;
 pub(crate) mod sideways;
 mod text;
-mod uncertain;
+pub(crate) mod uncertain;
 mod variants;
 mod warnings;
 mod working_point;
@@ -124,7 +124,7 @@ pub struct LambdaReport {
 impl LambdaOptions {
     /// These options with the just-noticeable difference of the force that `problem` requests: the rms force of the
     /// chosen constant. Where it is faint at one and not at the other, the one of larger forces holds.
-    fn with_jnd_of(&self, problem: &ForceProblem) -> Result<Cow<'_, Self>, RunError> {
+    pub(crate) fn with_jnd_of(&self, problem: &ForceProblem) -> Result<Cow<'_, Self>, RunError> {
         if !self.jnd_by_force {
             return Ok(Cow::Borrowed(self));
         }
@@ -226,31 +226,30 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
     let options = &options.for_document(document);
+    uncertain::check(options, design)?;
     let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
-    let opened = OpenedSurface::new(document, inputs.clone(), progress)?;
-    let search = search(&scene, (document, &opened), options, progress)?;
+    let (points, of_grid, search) =
+        object_points(&scene, document, inputs.clone(), options, progress)?;
     let document = search
         .as_ref()
         .map_or(document, |(_, chosen)| &chosen.document);
     let options = &options.over(document);
-    let points = opened.discretize(document, &PointsOptions::default(), None, progress)?;
-    let of_grid = ForcePoints::of_object(&points, options.weights_of(&points), &design.workspace);
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
     let sample = |how| scattered::run(document, inputs.clone(), how, progress);
     let sampled = sampling.map(sample).transpose()?;
-    let chosen = sampled.as_ref().map(ForcePoints::of_scattered);
+    let chosen = sampled
+        .as_ref()
+        .map(ForcePoints::of_scattered)
+        .transpose()?;
     let coarser = sampling.and_then(coarser).map(sample).transpose()?;
-    let coarser = coarser.as_ref().map(ForcePoints::of_scattered);
-    // The steel is solved once, for the lowest of all places.
+    let coarser = coarser
+        .as_ref()
+        .map(ForcePoints::of_scattered)
+        .transpose()?;
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
-    let lowest = of_all.into_iter().flatten();
-    let lowest = lowest.map(|points| points.lowest_place_m(&scene.design.workspace));
-    let lowest_m = lowest.fold(f64::INFINITY, f64::min);
-    let lowest_m = options
-        .feedback
-        .map_or(lowest_m, |feedback| feedback.lowest_m(&scene, lowest_m));
+    let lowest_m = lowest_place_m(&scene, &of_all, options);
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
@@ -299,13 +298,48 @@ pub fn run(
     Ok((points, report))
 }
 
+/// The lowest of all places: the steel is solved once, for it.
+fn lowest_place_m(scene: &Scene, of_all: &[Option<&ForcePoints>], options: &LambdaOptions) -> f64 {
+    let lowest = of_all.iter().flatten();
+    let lowest = lowest.map(|points| points.lowest_place_m(&scene.design.workspace));
+    let lowest_m = lowest.fold(f64::INFINITY, f64::min);
+    let feedback = options.feedback;
+    feedback.map_or(lowest_m, |feedback| feedback.lowest_m(scene, lowest_m))
+}
+
+/// The grid that was chosen for a requested error.
+type Search = Option<(ErrorTarget, ChosenGrid)>;
+
+/// The points of an object and those of lambda, on a grid that is chosen for the error of `options` where one is
+/// requested; they are [`LambdaOptions::for_document`].
+///
+/// # Errors
+/// A shape that cannot be computed; interruption.
+pub(crate) fn object_points(
+    scene: &Scene,
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<(PointsReport, ForcePoints, Search), RunError> {
+    let opened = OpenedSurface::new(document, inputs, progress)?;
+    let search = search(scene, (document, &opened), options, progress)?;
+    let document = search
+        .as_ref()
+        .map_or(document, |(_, chosen)| &chosen.document);
+    let points = opened.discretize(document, &PointsOptions::default(), None, progress)?;
+    let rule = options.weights_of(&points);
+    let of_grid = ForcePoints::of_object(&points, rule, &scene.design.workspace);
+    Ok((points, of_grid, search))
+}
+
 /// The grid for the requested error, where one is requested and the points are those of a grid.
 fn search(
     scene: &Scene,
     (document, opened): (&ShapeDocument, &OpenedSurface),
     options: &LambdaOptions,
     progress: &dyn Progress,
-) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
+) -> Result<Search, RunError> {
     let Some(target) = options.error.filter(|_| options.sampling.is_none()) else {
         return Ok(None);
     };

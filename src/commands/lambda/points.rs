@@ -151,11 +151,20 @@ impl ForcePoints {
             .collect()
     }
 
-    pub(crate) fn of_scattered(report: &ScatteredReport) -> Self {
+    /// # Errors
+    /// Points that cover no area, by which they count.
+    pub(crate) fn of_scattered(report: &ScatteredReport) -> Result<Self, RunError> {
         let (points, summary) = (&report.points, &report.summary);
+        if points.weight_m2.iter().all(|area| *area == 0.0) {
+            return Err(RunError::Input(
+                "random points count by area, and a point or a row of them has none: give two ends along x and \
+                 y, or leave --poisson out"
+                    .to_owned(),
+            ));
+        }
         // The patches' deviation is in it; without patches nothing is known between the points.
         let patches = summary.accuracy.contains_key("patches");
-        Self {
+        Ok(Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
             normals: points.normal.clone(),
@@ -169,7 +178,7 @@ impl ForcePoints {
             grid: None,
             fine: None,
             warnings: summary.warnings.clone(),
-        }
+        })
     }
 
     /// The requested force over lambda times the height, at each point.
@@ -261,7 +270,7 @@ impl ForcePoints {
     }
 
     /// The lowest place, of points and samples, that forces are computed at, m.
-    pub(super) fn lowest_place_m(&self, workspace: &Workspace) -> f64 {
+    pub(crate) fn lowest_place_m(&self, workspace: &Workspace) -> f64 {
         let cells = self.fine.iter();
         let samples = cells.flat_map(|fine| self.sample_places_m(fine, workspace));
         samples.map(|[_, _, z]| z).fold(self.lowest_m(), f64::min)

@@ -2,6 +2,7 @@
 
 use crate::RunError;
 use crate::bundle::lambda_file::LambdaFile;
+use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::uncertainty::{
     Draw, Drawn, StudyError, Surroundings, Turned, displacements_m, draws, most_points, study,
@@ -18,6 +19,20 @@ use super::points::ForcePoints;
 
 /// Random displays.
 const DRAWS: usize = 1000;
+
+/// # Errors
+/// A cap of power for currents that nothing requests.
+pub(crate) fn check(options: &LambdaOptions, design: &Design) -> Result<(), RunError> {
+    let given = options.uncertainty.over(design.uncertainty);
+    if given.is_none() && options.uncertainty.power_cap_w.is_some() {
+        return Err(RunError::Input(
+            "--power-cap bounds the currents that are chosen for uncertainties, and there are none: add \
+             --sensor-error, --tilt, --heat or --driver-error, or [uncertainty] to the design"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
 
 /// Adds the study to `file`, if anything is uncertain and there are currents.
 ///

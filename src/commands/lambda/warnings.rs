@@ -162,9 +162,13 @@ fn binds_at_zero(problem: &ForceProblem) -> String {
         .map(|i| i.to_string())
         .collect();
     if !dead.is_empty() {
+        let [limits, are, them] = match dead.len() {
+            1 => ["limit of coil", "is", "it"],
+            _ => ["limits of coils", "are", "them"],
+        };
         return format!(
-            "the current limit of coil {} is 0 A; raise it, or leave coils that carry no current \
-             out of the array (positions_mm)",
+            "the current {limits} {} {are} 0 A; raise {them}, or leave coils that carry no current out of the \
+             array (positions_mm)",
             dead.join(", ")
         );
     }

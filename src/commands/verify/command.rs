@@ -88,18 +88,18 @@ impl Verify {
     }
 
     fn summary(&self, report: &VerifyReport) -> String {
-        let failed = report.checks.iter().any(|check| !check.passed);
+        let failed = report.checks.iter().filter(|check| !check.passed).count();
+        let all = count(report.checks.len(), "check");
         let verdict = match (failed, report.unchecked.is_empty()) {
-            (true, _) => "FAILED",
-            (false, true) => "passed",
-            (false, false) => "passed, parts NOT CHECKED",
+            (0, true) => format!("{all} passed"),
+            (0, false) => format!("{all} passed, parts NOT CHECKED"),
+            (failed, _) => format!("{failed} of {all} FAILED"),
         };
         let mut sheet = Sheet::new(&format!(
-            "{}: {} on {}, {} {verdict}",
+            "{}: {} on {}, {verdict}",
             self.bundle.display(),
             report.shape,
             report.design,
-            count(report.checks.len(), "check")
         ));
         sheet.gap();
         sheet.raw(&checks_table(&report.checks));

@@ -13,8 +13,9 @@ use crate::scene::evaluation_sample::spread;
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
-/// How much a force constant may move with the stated error of steel's forces.
-const FORCES_MOVE: f64 = 10.0;
+/// How much a force constant may move with the stated error of the forces: of coils that are nearly alike at
+/// the points by more than twenty times it.
+const FORCES_MOVE: f64 = 30.0;
 /// Largest duality gap, relative to the mean square of the requested force.
 const GAP_ALLOWED: f64 = 1e-10;
 
@@ -34,12 +35,7 @@ pub(super) fn checks(
         .map(|p| [p.x_m, p.y_m, p.height_m])
         .collect();
     let lowest_m = bundle.map.z_m.first().copied().unwrap_or(0.0);
-    // Forces that differ by their stated error move force constants and errors by a few times it.
-    let slack = if route.solved.has_steel() {
-        FORCES_MOVE * bounds.forces
-    } else {
-        0.0
-    };
+    let slack = FORCES_MOVE * bounds.forces;
     let solved = route.solved.for_forces(scene, lowest_m)?;
     let forces = scene.forces_n_per_a(&solved, &positions, progress)?;
     let mut checks = vec![sampled_forces(route, bounds, &positions, &forces)?];
@@ -115,7 +111,10 @@ fn currents_checks(
         let sum: f64 = squares.map(|(point, v)| weight(point) * v * v).sum();
         sum / (0..values.len()).map(weight).sum::<f64>()
     };
-    let mean_square_force = lambda * lambda * mean_square_of(heights);
+    // Of lambda = 0 the pull is all that is requested.
+    let pull = problem.offset_n.filter(|_| lambda == 0.0);
+    let mean_square_force =
+        lambda * lambda * mean_square_of(heights) + pull.map_or(0.0, &mean_square_of);
     let rms_force = mean_square_force.sqrt();
     let mean_square = mean_square_of(&residual);
     let largest = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
@@ -166,7 +165,12 @@ fn passive_slack(
         .flatten()
         .filter(|l| *l > 0.0)
         .fold(f64::INFINITY, f64::min);
-    FORCES_MOVE * bounds.pull * ratio(rms(offset_n), least * rms(heights)).min(1.0)
+    let share = if least.is_finite() {
+        ratio(rms(offset_n), least * rms(heights)).min(1.0)
+    } else {
+        1.0
+    };
+    FORCES_MOVE * bounds.pull * share
 }
 
 fn sampled_forces(

@@ -45,6 +45,8 @@ use crate::shape::document::ShapeDocument;
 
 /// Errors that a bundle claims are believed up to this where they cannot be computed again.
 const CLAIMED_MAX: f64 = 1e-3;
+/// And errors between nodes up to this: nodes too few to resolve anything are a result too.
+const BETWEEN_MAX: f64 = 10.0;
 
 /// The checks of a bundle: the JSON result.
 #[derive(Debug, Clone, Serialize)]
@@ -420,8 +422,8 @@ impl Bounds {
         Self {
             forces: claimed.forces.min(CLAIMED_MAX),
             map: claimed.map.min(CLAIMED_MAX),
-            // Nodes that are right leave nothing to claim between them.
-            between: claimed.between.map(|error| error.min(1.0)),
+            // Nodes that are right leave little to claim between them.
+            between: claimed.between.map(|error| error.min(BETWEEN_MAX)),
             pull: claimed.pull.min(CLAIMED_MAX),
             pull_map: claimed.pull_map.min(CLAIMED_MAX),
             pull_between: claimed.pull_between.min(1.0),

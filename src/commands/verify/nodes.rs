@@ -41,6 +41,25 @@ fn largest_in_plane(bundle: &Bundle, values: &[f64], level: usize) -> f64 {
         .fold(0.0, |most: f64, g| most.max(g.abs()))
 }
 
+/// The largest |grad B| at each height of the map, T/m/A, at least: that on a coil's axis or over the map. Without
+/// currents at the place the trace of grad B is zero, so that |grad B|^2 is 3/2 (dB_z/dz)^2 at least.
+fn largest_gradients(bundle: &Bundle, route: &Route) -> Result<Vec<f64>, RunError> {
+    let map = &bundle.map;
+    let Some(coil) = map.coil.first().map(|coil| *coil as usize) else {
+        return Ok(Vec::new());
+    };
+    let [x, y] = route.scene.coils[coil].axis_m;
+    let above: Vec<(usize, [f64; 3])> = map.z_m.iter().map(|z| (coil, [x, y, *z])).collect();
+    let on_axis = route.gradients(&above)?;
+    let levels = on_axis.iter().enumerate();
+    Ok(levels
+        .map(|(level, [_, _, gz])| {
+            let on_nodes = largest_in_plane(bundle, &map.gz_t_per_m_per_a, level);
+            1.5_f64.sqrt() * on_nodes.max(gz.abs())
+        })
+        .collect())
+}
+
 /// Sampled nodes.
 pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<Check>, RunError> {
     let map = &bundle.map;
@@ -55,10 +74,7 @@ pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<
         })
         .collect();
     let exact = route.gradients(&requested)?;
-    // Errors of nodes are relative to the whole gradient, of which dB_z/dz is the largest part.
-    let sizes: Vec<f64> = (0..nz)
-        .map(|level| largest_in_plane(bundle, &map.gz_t_per_m_per_a, level))
-        .collect();
+    let sizes = largest_gradients(bundle, route)?;
     let checks = held(bundle).into_iter().map(|([name, _], part, values)| {
         let worst = places
             .iter()

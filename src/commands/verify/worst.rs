@@ -42,8 +42,12 @@ pub(super) fn checks(
     ) else {
         return Ok(checks);
     };
-    let heights = problem.height_m.iter();
-    let requested = lambda * heights.fold(0.0_f64, |most, h| most.max(h.abs()));
+    let largest_of = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // Of lambda = 0 the pull is all that is requested.
+    let requested = match problem.offset_n {
+        Some(pull) if lambda == 0.0 => largest_of(pull),
+        _ => lambda * largest_of(problem.height_m),
+    };
     let coils = problem.coils();
     let points = problem.points();
     if currents.len() != coils || active.iter().any(|active| active.point >= points) {

@@ -136,8 +136,9 @@ pub(super) struct Images<'a> {
     motions: &'a [Motion],
     /// The different places in the sector, m.
     pub(super) sector_m: Vec<[f64; 3]>,
-    /// Of every place the one in the sector, and the motion that takes it there.
-    origins: Vec<(usize, usize)>,
+    /// Of every place the one in the sector, and by bits the motions that take it there: several where it lies on a
+    /// mirror's plane or in the centre.
+    origins: Vec<(usize, u8)>,
 }
 
 impl<'a> Images<'a> {
@@ -154,21 +155,23 @@ impl<'a> Images<'a> {
                 // The sector is where the first coordinate, then the second, is largest.
                 let larger =
                     |a: [f64; 2], b: [f64; 2]| a[0] > b[0] || (a[0] == b[0] && a[1] > b[1]);
-                let mut first = (0, about);
+                let mut first = (1_u8, about);
                 for (number, motion) in motions.iter().enumerate().skip(1) {
                     let image = motion.image(about);
                     if larger(image, first.1) {
-                        first = (number, image);
+                        first = (1 << number, image);
+                    } else if image == first.1 {
+                        first.0 |= 1 << number;
                     }
                 }
-                let (motion, [dx, dy]) = first;
+                let (taking, [dx, dy]) = first;
                 let place = [centre_m[0] + dx, centre_m[1] + dy, *z];
                 let key = place.map(|v| (v / step).round() as i64);
                 let index = *known.entry(key).or_insert_with(|| {
                     sector_m.push(place);
                     sector_m.len() - 1
                 });
-                (index, motion)
+                (index, taking)
             })
             .collect();
         Self {
@@ -179,44 +182,68 @@ impl<'a> Images<'a> {
     }
 
     /// Values at all places from those in the sector, both [drive, component, place], every coil being
-    /// a drive. Coils keep their sense of turning under a mirror, so that B maps as a polar vector.
+    /// a drive. Coils keep their sense of turning under a mirror, so that B maps as a polar vector. On a mirror's plane
+    /// coils that mirror each other give the same but for the rounding of a mean.
     pub(super) fn spread(&self, parts: Components, sector: &[f64], out: &mut [f64]) {
-        let (count, from_count, to_count) =
-            (parts.count(), self.sector_m.len(), self.origins.len());
+        let (count, to_count) = (parts.count(), self.origins.len());
         for (drive, out) in out.chunks_exact_mut((count * to_count).max(1)).enumerate() {
-            for (place, (index, motion)) in self.origins.iter().enumerate() {
-                let motion = &self.motions[*motion];
-                let values = &sector[motion.coil[drive] * count * from_count..];
-                let at = |component: usize| values[component * from_count + index];
-                let mut put =
-                    |component: usize, value: f64| out[component * to_count + place] = value;
-                let mut put_vector = |[x, y, z]: [usize; 3]| {
-                    let [along_x, along_y] = motion.origin([at(x), at(y)]);
-                    put(x, along_x);
-                    put(y, along_y);
-                    put(z, at(z));
-                };
-                match parts {
-                    Components::Gz => put(0, at(0)),
-                    Components::Force => put_vector([0, 1, 2]),
-                    Components::Gradient | Components::All => {
-                        put_vector([2, 3, 4]);
-                        if parts == Components::All {
-                            put_vector([5, 6, 7]);
-                        }
-                        // Rows, then columns, of the part across the axis.
-                        let (xx, xy, yy) = (at(0), at(1), -at(0) - at(4));
-                        let [a, b] = [[xx, xy], [xy, yy]].map(|row| motion.origin(row));
-                        let [xx, _] = motion.origin([a[0], b[0]]);
-                        let [xy, _] = motion.origin([a[1], b[1]]);
-                        put(0, xx);
-                        put(1, xy);
-                    }
+            for (place, (index, taking)) in self.origins.iter().enumerate() {
+                let motions = self.motions.iter().enumerate();
+                let motions = motions.filter(|(number, _)| taking >> number & 1 == 1);
+                let mut sums = [0.0; MOST_COMPONENTS];
+                for (_, motion) in motions {
+                    let values =
+                        self.moved_back(parts, sector, (motion.coil[drive], *index), motion);
+                    sums.iter_mut()
+                        .zip(values)
+                        .for_each(|(sum, value)| *sum += value);
+                }
+                let share = 1.0 / f64::from(taking.count_ones());
+                for (component, sum) in sums[..count].iter().enumerate() {
+                    out[component * to_count + place] = share * sum;
                 }
             }
         }
     }
+
+    /// The components of a drive at a place of the sector, as they are where `motion` came from.
+    fn moved_back(
+        &self,
+        parts: Components,
+        sector: &[f64],
+        (drive, place): (usize, usize),
+        motion: &Motion,
+    ) -> [f64; MOST_COMPONENTS] {
+        let (count, places) = (parts.count(), self.sector_m.len());
+        let values = &sector[drive * count * places..];
+        let mut moved = [0.0; MOST_COMPONENTS];
+        for (component, value) in moved[..count].iter_mut().enumerate() {
+            *value = values[component * places + place];
+        }
+        let turn = |moved: &mut [f64; MOST_COMPONENTS], [x, y]: [usize; 2]| {
+            [moved[x], moved[y]] = motion.origin([moved[x], moved[y]]);
+        };
+        match parts {
+            Components::Gz => {}
+            Components::Force => turn(&mut moved, [0, 1]),
+            Components::Gradient | Components::All => {
+                // Rows, then columns, of the part across the axis.
+                let (xx, xy, yy) = (moved[0], moved[1], -moved[0] - moved[4]);
+                let [a, b] = [[xx, xy], [xy, yy]].map(|row| motion.origin(row));
+                [moved[0], _] = motion.origin([a[0], b[0]]);
+                [moved[1], _] = motion.origin([a[1], b[1]]);
+                turn(&mut moved, [2, 3]);
+                if parts == Components::All {
+                    turn(&mut moved, [5, 6]);
+                }
+            }
+        }
+        moved
+    }
 }
+
+/// Of [`Components::All`].
+const MOST_COMPONENTS: usize = 8;
 
 #[cfg(test)]
 mod tests {
@@ -323,6 +350,18 @@ mod tests {
                     [centre_m[0] + step(i % 41), centre_m[1] + step(i / 41), 0.03]
                 })
                 .collect();
+            // On a mirror's plane, coils that mirror each other give the same.
+            let plane: Vec<[f64; 3]> = nodes.iter().skip(20).step_by(41).copied().collect();
+            let mut gz = vec![0.0; positions_m.len() * plane.len()];
+            sources.sample(&plane, Components::Gz, &mut gz);
+            let keeps = |motion: &&Motion| motion.image([0.0, 1.0]) == [0.0, 1.0];
+            let mirror = symmetries.iter().skip(1).find(keeps).unwrap();
+            let of = |coil: usize| &gz[coil * plane.len()..][..plane.len()];
+            for (coil, other) in mirror.coil.iter().enumerate() {
+                for (a, b) in of(coil).iter().zip(of(*other)) {
+                    assert!((a - b).abs() <= 4.0 * f64::EPSILON * a.abs(), "{a:e} {b:e}");
+                }
+            }
             let different = Images::new(&symmetries, centre_m, &nodes).sector_m.len();
             assert_eq!(different, if sectors == 8 { 231 } else { 441 });
         }

@@ -65,7 +65,8 @@ pub struct FeltError {
     pub vertical: f64,
     /// Of its sideways part.
     pub sideways: f64,
-    /// The longest difference at any point within the bounds, relative to the largest requested force.
+    /// The longest difference at any point that was found within the bounds, at places on them, relative to the largest
+    /// requested force.
     pub worst: f64,
     /// Mean power in the coils, W.
     pub mean_power_w: f64,
@@ -396,12 +397,22 @@ fn driven_wrong(parts: &[[f64; 3]], strength: f64, rest: [f64; 3], driver: f64) 
         }
         sum
     };
-    let mut error = sum(&|_| 0.0);
-    for _ in 0..if driver > 0.0 { SIGN_TURNS } else { 0 } {
-        let way = error;
-        error = sum(&|part| (way[0] * part[0] + way[1] * part[1] + way[2] * part[2]).signum());
+    let length = |v: [f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
+    let undisturbed = sum(&|_| 0.0);
+    if driver <= 0.0 {
+        return length(undisturbed);
     }
-    error[0].hypot(error[1]).hypot(error[2])
+    // Every start ends in a largest sum of its own.
+    let axes = [0, 1, 2].map(|axis| std::array::from_fn(|k| f64::from(u8::from(k == axis))));
+    let starts = axes
+        .into_iter()
+        .flat_map(|way: [f64; 3]| [way, way.map(|v| -v)]);
+    let ended = starts.chain([undisturbed]).map(|start| {
+        (0..SIGN_TURNS).fold(start, |way, _| {
+            sum(&|part| (way[0] * part[0] + way[1] * part[1] + way[2] * part[2]).signum())
+        })
+    });
+    ended.map(length).fold(0.0, f64::max)
 }
 
 /// Random displays with the forces per ampere, [draw, coil], and pulls at their places.
@@ -672,5 +683,39 @@ impl Costs<'_> {
                 .total_cmp(&a.halving_gains.feedback)
         });
         (exact, causes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fluxform_testing::Random;
+
+    /// Regression: the signs followed one start to a sum that others exceed.
+    #[test]
+    fn drivers_errors_add_up_to_nearly_the_longest_of_all_signs() {
+        let mut random = Random::new(7_u64);
+        for _ in 0..200 {
+            let mut vector = |size: f64| [0; 3].map(|_| size * (random.unit() - 0.5));
+            let parts: Vec<[f64; 3]> = (0..6).map(|_| vector(1.0)).collect();
+            let rest = vector(0.3);
+            let found = driven_wrong(&parts, 1.1, rest, 0.5);
+            let longest = (0..64_u32)
+                .map(|signs| {
+                    let mut sum = rest;
+                    for (k, part) in parts.iter().enumerate() {
+                        let sign = if signs >> k & 1 == 1 { 1.0 } else { -1.0 };
+                        for (total, value) in sum.iter_mut().zip(part) {
+                            *total += 1.1 * (1.0 + 0.5 * sign) * value;
+                        }
+                    }
+                    sum[0].hypot(sum[1]).hypot(sum[2])
+                })
+                .fold(0.0, f64::max);
+            assert!(
+                found <= longest * (1.0 + 1e-12) && found > 0.97 * longest,
+                "{found} {longest}"
+            );
+        }
     }
 }

@@ -172,14 +172,23 @@ pub fn worst_point(
     );
     let paths = (scaled.within(WORK) && free.within(WORK))
         .then(|| follow(&mut scaled, &mut free, open.is_some()));
-    if let Some(paths) = paths.as_ref().filter(|paths| paths.complete) {
+    let complete = paths.as_ref().filter(|paths| paths.complete);
+    // Where rounding leads currents astray, their forces are off by more than is requested.
+    let sound = |followed: &Followed| followed.doubt < 1.0;
+    let both_sound = |paths: &Paths| sound(&paths.limited) && sound(&paths.unlimited);
+    if let Some(paths) = complete.filter(|paths| both_sound(paths)) {
         return Ok(read_off(problem, settings, &scaled, paths));
     }
     for leeway in [0.0, LEEWAY_OF_CONSTANTS] {
         scaled.leeway = leeway;
         free.leeway = leeway;
         if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
-            return Ok(without_path(&scaled, &constants));
+            let limited = complete.map(|paths| &paths.limited);
+            let limited = limited.filter(|limited| sound(limited));
+            return Ok(WorstSolution {
+                path: limited.map(|limited| WorstPath::new(problem, &scaled, limited)),
+                ..without_path(&scaled, &constants)
+            });
         }
     }
     scaled.leeway = 0.0;
@@ -189,7 +198,7 @@ pub fn worst_point(
         end: End::Stalled,
         doubt: 0.0,
     };
-    let paths = paths.unwrap_or_else(|| Paths {
+    let paths = paths.filter(both_sound).unwrap_or_else(|| Paths {
         limited: nothing(),
         unlimited: nothing(),
         complete: false,
