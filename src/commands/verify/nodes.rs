@@ -1,7 +1,7 @@
 //! The map, on its nodes and between them.
 
 use super::route::Route;
-use super::{Bounds, Check, check, ratio};
+use super::{BETWEEN_MAX, Bounds, Check, check, ratio};
 use crate::RunError;
 use crate::bundle::load::Bundle;
 use crate::field::winding::KERNEL_ERROR;
@@ -147,7 +147,12 @@ pub(super) fn between(
             "{} places between nodes, interpolated as the loaders do",
             places.len()
         );
-        check(name, worst, bounds.between[part].max(KERNEL_ERROR), how)
+        // An error above 1 states that the nodes resolve nothing, not how far off places between them are.
+        let stated = match bounds.between[part] {
+            unresolved if unresolved >= 1.0 => unresolved.max(BETWEEN_MAX),
+            stated => stated.max(KERNEL_ERROR),
+        };
+        check(name, worst, stated, how)
     });
     Ok(checks.collect())
 }

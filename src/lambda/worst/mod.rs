@@ -65,6 +65,8 @@ const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
 /// The same where the constants alone take too much work in doubles otherwise: coils side by side
 /// whose forces are nearly those of their neighbours.
 const LEEWAY_OF_CONSTANTS: f64 = 1e-6;
+/// Rounding of forces, relative to the largest that is requested, from which on it has led a path's currents astray.
+const ASTRAY: f64 = 1e-2;
 
 /// Work that the path may take, both with the drivers' size and without.
 const WORK: Work = Work(10_000_000);
@@ -173,8 +175,7 @@ pub fn worst_point(
     let paths = (scaled.within(WORK) && free.within(WORK))
         .then(|| follow(&mut scaled, &mut free, open.is_some()));
     let complete = paths.as_ref().filter(|paths| paths.complete);
-    // Where rounding leads currents astray, their forces are off by more than is requested.
-    let sound = |followed: &Followed| followed.doubt < 1.0;
+    let sound = |followed: &Followed| followed.doubt < ASTRAY;
     let both_sound = |paths: &Paths| sound(&paths.limited) && sound(&paths.unlimited);
     if let Some(paths) = complete.filter(|paths| both_sound(paths)) {
         return Ok(read_off(problem, settings, &scaled, paths));
