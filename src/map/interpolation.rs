@@ -20,8 +20,6 @@ pub struct InterpolationError {
 /// Samples find the largest error but for this factor: the cubic's error peaks within a few
 /// percent of the middle of a cell, and the samples lie in the middles of cells, faces and edges.
 const SAFETY: f64 = 1.25;
-/// From this error on the nodes resolve no peak, and samples say little of the places between them: twice it is stated.
-const UNRESOLVED: f64 = 0.25;
 
 /// The relative error falls as the fourth power of the step over the height: the lowest cells
 /// decide, and the highest because its stencil is one-sided.
@@ -141,11 +139,6 @@ pub fn interpolation_errors_by(
                 }
                 worst.samples += plane * watched.len();
             }
-        }
-    }
-    for error in &mut all {
-        if error.largest > UNRESOLVED {
-            error.largest *= 2.0;
         }
     }
     Ok(all)

@@ -475,7 +475,7 @@ fn the_range_of_the_just_noticeable_difference_is_said() {
 const ROW: &str = "name = \"row\"\nprimitive = \"half-cylinder\"\nradius_mm = 50.0\nlength_mm = 100.0\n\
                    base_mm = 30.0\n[points]\nx_mm = [0.0, 0.0, 1]\ny_mm = [-50.0, 50.0, 61]\n";
 
-/// Regression: rounding told two columns apart that mirror each other, and lambda_linear was half of what it is.
+/// Regression: rounding distinguished two columns that mirror each other, and lambda_linear was half of what it is.
 #[test]
 fn coils_that_mirror_each_other_at_every_point_share_the_current() {
     let place = Place::new();

@@ -558,7 +558,7 @@ pub(crate) fn summary(made: &SceneMap, components: Components) -> MapSummary {
         "of dB_z/dz, relative to the largest |dB_z/dz| at that height: 1.25 times the largest \
          difference from direct values at {} places in the middles of cells, faces and edges, in the four \
          lowest layers and the highest, where it is largest, of the innermost and the outermost coil and of \
-         those whose axes are nearest to a node and to the middle of a cell; from 25 % on twice that",
+         those whose axes are nearest to a node and to the middle of a cell",
         between.samples
     );
     MapSummary {

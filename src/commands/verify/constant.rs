@@ -13,9 +13,8 @@ use crate::scene::evaluation_sample::spread;
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
-/// How much a force constant may move with the stated error of the forces: of coils that are nearly alike at
-/// the points by more than twenty times it.
-const FORCES_MOVE: f64 = 30.0;
+/// How much a force constant may move with the stated error of the forces.
+const FORCES_MOVE: f64 = 10.0;
 /// Largest duality gap, relative to the mean square of the requested force.
 const GAP_ALLOWED: f64 = 1e-10;
 
@@ -164,13 +163,9 @@ fn passive_slack(
         .into_iter()
         .flatten()
         .filter(|l| *l > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    let share = if least.is_finite() {
-        ratio(rms(offset_n), least * rms(heights)).min(1.0)
-    } else {
-        1.0
-    };
-    FORCES_MOVE * bounds.pull * share
+        .reduce(f64::min)
+        .unwrap_or(0.0);
+    FORCES_MOVE * bounds.pull * ratio(rms(offset_n), least * rms(heights)).min(1.0)
 }
 
 fn sampled_forces(
