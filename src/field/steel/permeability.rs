@@ -14,10 +14,24 @@ pub struct Response {
     pub differential: f64,
 }
 
+/// Over shorter parts of the field the mean slope of B is that in the middle.
+const SHORT: f64 = 1e-3;
+
 /// An isotropic material without memory. B must grow with H and be at least mu_0 H.
 pub trait Permeability: Debug + Sync {
     /// The material's relative and differential permeability at `h_a_per_m` >= 0.
     fn response(&self, h_a_per_m: f64) -> Response;
+
+    /// The mean of dB/dH over mu_0 from `reach_a_per_m` below `h_a_per_m` to as far above it.
+    fn mean_differential(&self, h_a_per_m: f64, reach_a_per_m: f64) -> f64 {
+        if reach_a_per_m <= SHORT * h_a_per_m {
+            return self.response(h_a_per_m).differential;
+        }
+        // B is odd in H.
+        let b = |h: f64| h * self.response(h.abs()).relative;
+        let (below, above) = (h_a_per_m - reach_a_per_m, h_a_per_m + reach_a_per_m);
+        (b(above) - b(below)) / (above - below)
+    }
 }
 
 /// A material whose permeability does not depend on the field.
@@ -80,6 +94,23 @@ impl Permeability for Froehlich {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mean_slope_is_that_of_the_chord() {
+        let law = Froehlich {
+            m: 1.3e6,
+            h0: 700.0,
+        };
+        let b = |h: f64| h * law.response(h).relative;
+        let chord = (b(900.0) - b(300.0)) / 600.0;
+        assert!((law.mean_differential(600.0, 300.0) / chord - 1.0).abs() < 1e-13);
+        // B is odd: from -200 to 600.
+        let through_zero = (b(600.0) + b(200.0)) / 800.0;
+        assert!((law.mean_differential(200.0, 400.0) / through_zero - 1.0).abs() < 1e-13);
+        let tangent = law.response(600.0).differential;
+        assert!((law.mean_differential(600.0, 1.0) / tangent - 1.0).abs() < 1e-5);
+        assert_eq!(law.mean_differential(600.0, 0.0), tangent);
+    }
 
     #[test]
     fn a_curves_response_is_its_own() {

@@ -207,7 +207,7 @@ impl Interior {
             .linearize(
                 &DVector::zeros(rows * columns),
                 &Constant { relative: 1.0 },
-                0.0,
+                None,
             )
             .map_err(|NotPositive| MeshError::Breakpoints { axis: "r and z" })?;
         Ok(interior)
@@ -289,9 +289,8 @@ impl Interior {
     /// the boundary values by d changes the flux, once the inner equations are satisfied, from
     /// `load` by `matrix` d.
     ///
-    /// That is the tangent when `secant` is 0. Along grad u the permeability is the mean of dB/dH
-    /// and B / H, the latter's share being `secant` (0 to 1): where B saturates a stiffer system,
-    /// whose corrections are shorter where the tangent's would be too long.
+    /// That is the tangent without `change`. With it, a change of u, the permeability along grad u is the mean
+    /// dB/dH over as far either way as that change moves H ([`Permeability::mean_differential`]).
     ///
     /// # Errors
     /// [`NotPositive`] when the law's differential permeability is not positive or u not finite.
@@ -299,11 +298,11 @@ impl Interior {
         &self,
         u: &DVector<f64>,
         law: &dyn Permeability,
-        secant: f64,
+        change: Option<&DVector<f64>>,
     ) -> Result<Condensed, NotPositive> {
         self.plan.condense(|index| {
             let cell = self.cell(index);
-            self.element(cell, &self.element_nodes(cell), u, law, Some(secant))
+            self.element(cell, &self.element_nodes(cell), u, law, Some(change))
         })
     }
 
@@ -455,20 +454,22 @@ impl Interior {
         (r_m, z_m, TAU * r_m * weight)
     }
 
-    /// One element's flux and, with a share of the secant, its stiffness.
+    /// One element's flux and, where requested, its stiffness: see [`Interior::linearize`].
     fn element(
         &self,
         cell: Cell,
         nodes: &[usize],
         u: &DVector<f64>,
         law: &dyn Permeability,
-        secant: Option<f64>,
+        stiffness: Option<Option<&DVector<f64>>>,
     ) -> Element {
         let Reference { values, slopes, .. } = &self.reference;
         let count = self.reference.degree + 1;
         let (stretch_r, stretch_z) = cell.stretch();
         let (mut flux_r, mut flux_z) = self.gradients(cell, &self.local(nodes, u));
-        let tangent_share = 1.0 - secant.unwrap_or(0.0);
+        let change = stiffness
+            .flatten()
+            .map(|change| self.gradients(cell, &self.local(nodes, change)));
         let mut tangent = [(); 3].map(|()| DMatrix::zeros(count, count));
         for b in 0..count {
             for a in 0..count {
@@ -485,7 +486,10 @@ impl Interior {
                 } else {
                     (0.0, 0.0)
                 };
-                let along = tangent_share * (response.differential - response.relative);
+                let reach = change
+                    .as_ref()
+                    .map_or(0.0, |(c_r, c_z)| c_r[at].hypot(c_z[at]));
+                let along = law.mean_differential(h, reach) - response.relative;
                 tangent[0][at] =
                     weight * stretch_r * stretch_r * (response.relative + along * e_r * e_r);
                 tangent[1][at] = weight * stretch_r * stretch_z * along * e_r * e_z;
@@ -495,7 +499,7 @@ impl Interior {
         }
         let load = slopes.tr_mul(&flux_r) * values + values.tr_mul(&flux_z) * slopes;
         let load = DVector::from_column_slice(load.as_slice());
-        let matrix = if secant.is_some() {
+        let matrix = if stiffness.is_some() {
             self.stiffness(&tangent)
         } else {
             DMatrix::zeros(0, 0)

@@ -20,7 +20,7 @@ pub(super) struct State {
 
 /// Corrections of u at every node and of v.
 pub(super) struct Change {
-    u: DVector<f64>,
+    pub(super) u: DVector<f64>,
     v: DVector<f64>,
 }
 
@@ -57,14 +57,15 @@ impl SaturatedCore {
         v.add_scalar(-mean)
     }
 
-    /// Newton's correction, and the energy's slope along it; `None` when there is none.
+    /// Newton's correction, and the energy's slope along it; `None` when there is none. `last` is the change of u
+    /// that led here.
     pub(super) fn correction(
         &self,
         state: &State,
         law: &dyn Permeability,
-        secant: f64,
+        last: Option<&DVector<f64>>,
     ) -> Option<(Change, f64)> {
-        let tangent = self.interior.linearize(&state.u, law, secant).ok()?;
+        let tangent = self.interior.linearize(&state.u, law, last).ok()?;
         let mut system = &tangent.matrix * &self.w + &self.outer_m;
         // Constants in v have no effect and the residual's sum is zero: with a constant added to
         // every entry the correction is the one whose sum is zero.

@@ -309,3 +309,21 @@ fn a_curve_that_starts_level() {
     assert!(added_h[0] - added_h[5] < 1e-6 * added_h[0], "{added_h:?}");
     assert!(added_h[0] - added_h[11] > 0.01 * added_h[0], "{added_h:?}");
 }
+
+/// A soft alloy whose permeability falls from a hundred thousand to one within a tenth of a tesla.
+fn soft_alloy() -> BhCurve {
+    let b_t = [0.0, 0.02, 0.2, 0.8, 1.3, 1.45, 1.52, 1.56, 1.58, 1.6];
+    let h = [0.0, 1.0, 3.0, 5.0, 8.0, 20.0, 100.0, 1e3, 5e3, 15e3];
+    BhCurve::new(&b_t, &h).expect("a good curve")
+}
+
+#[test]
+fn the_sharpest_knees_converge_at_every_current() {
+    let case = case(1e-4);
+    let law = soft_alloy();
+    for current_a in [0.5, 2.0, 6.0, 8.0, 12.0, 20.0, 40.0, 100.0, 1e3] {
+        let found = case.core.solve(&(&case.phi * current_a), &law, None);
+        assert_eq!(found.status, Convergence::Converged, "{current_a} A");
+        assert!(found.steps.len() <= 60, "{current_a} A: {:?}", found.steps);
+    }
+}

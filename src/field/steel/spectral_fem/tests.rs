@@ -113,7 +113,7 @@ fn whole_tangent(mesh: &Interior, u: &DVector<f64>, law: &dyn Permeability) -> D
     for index in 0..mesh.cell_count() {
         let cell = mesh.cell(index);
         let nodes = mesh.element_nodes(cell);
-        let element = mesh.element(cell, &nodes, u, law, Some(0.0));
+        let element = mesh.element(cell, &nodes, u, law, Some(None));
         for (j, &column) in nodes.iter().enumerate() {
             for (i, &row) in nodes.iter().enumerate() {
                 whole[(row, column)] += element.matrix[(i, j)];
@@ -197,7 +197,7 @@ fn condensed_correction_is_the_whole_systems() {
     let mesh = mesh(3);
     let law = Froehlich { m: 40.0, h0: 0.8 };
     let u = nodal(&mesh, |r, z| z + 0.4 * r * r * z + (1.7 * z).sin());
-    let linear = mesh.linearize(&u, &law, 0.0).expect("a growing law");
+    let linear = mesh.linearize(&u, &law, None).expect("a growing law");
     let boundary = on_boundary(&mesh, &nodal(&mesh, |r, z| 0.2 * z + r * r * z));
     let change = mesh.correction(&linear, &boundary);
     assert!((on_boundary(&mesh, &change) - &boundary).amax() < 1e-14);
