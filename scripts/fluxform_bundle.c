@@ -303,6 +303,9 @@ static int find_array(const archive *a, const char *name, const char *kind, size
     snprintf(start, sizeof start, "{'descr':'%s','fortran_order':False,'shape':(", kind);
     if (!skip(&text, end, start) || !parse_shape(&text, end, out) || !skip(&text, end, ")"))
         return fail(a, name, "is not of the expected kind, C order, little-endian");
+    (void)skip(&text, end, ",");
+    if (!skip(&text, end, "}") || end - text > 1 || (text < end && *text != '\n'))
+        return fail(a, name, "has a damaged header");
     if (out->dimensions != dimensions || out->count != (size - 10 - length) / 8 || (size - 10 - length) % 8)
         return fail(a, name, "does not hold what its shape says");
     out->data = data + 10 + length;

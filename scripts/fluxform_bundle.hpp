@@ -119,12 +119,12 @@ private:
             throw Error("room for " + std::to_string(room.size()) + " numbers, expected " + std::to_string(count));
     }
 
-    Step step(Currents currents, const Vector &at_m, std::vector<double> &current)
+    Step step(Currents compute, const Vector &at_m, std::vector<double> &current)
     {
         fits(current, coil_count());
         Step found{};
         found.answer = static_cast<Answer>(
-            currents(&bundle_, at_m[0], at_m[1], at_m[2], current.data(), &found));
+            compute(&bundle_, at_m[0], at_m[1], at_m[2], current.data(), &found));
         return found;
     }
 

@@ -337,18 +337,35 @@ static int reached(const vector_problem *p)
     return sqrt(dot(left, left, 3)) <= MET * size ? FLUXFORM_OK : FLUXFORM_SATURATED;
 }
 
+/* Brings all currents nearer to their lower limits, by the same share, until their sum is within its limit. */
+static void lower_to_sum(vector_problem *p)
+{
+    double sum = sum_of(p), least = 0, share;
+    for (size_t i = 0; i < p->n; i++)
+        least += p->lower[i];
+    if (!(sum > p->target[3]))
+        return;
+    share = (p->target[3] - least) / (sum - least);
+    for (size_t i = 0; i < p->n; i++)
+        p->currents[i] = p->lower[i] + share * (p->currents[i] - p->lower[i]);
+}
+
 static int solve_vector(vector_problem *p)
 {
-    double size = 0, stiffness = 0, y[4] = {0, 0, 0, 0};
+    double size = 0, stiffness = 0, most = 0, within_reach, y[4] = {0, 0, 0, 0};
     for (size_t i = 0; i < p->n; i++) {
-        size += p->conductance[i] * dot(p->rows + 4 * i, p->rows + 4 * i, 3);
+        double squared = dot(p->rows + 4 * i, p->rows + 4 * i, 3);
+        size += p->conductance[i] * squared;
         stiffness += p->conductance[i];
+        most += sqrt(squared) * fmax(p->upper[i], -p->lower[i]);
     }
+    /* The multipliers grow with the force beyond reach; the sum's limit holds all the same. */
+    within_reach = fmin(most / sqrt(dot(p->target, p->target, 3)), 1);
     for (double share = EPS_FIRST;; share *= EPS_FACTOR) {
         int rows = 3;
         for (int k = 0; k < 3; k++)
             p->eps[k] = share * size;
-        p->eps[3] = EPS_SUM * share * stiffness;
+        p->eps[3] = EPS_SUM * within_reach * share * stiffness;
         y[3] = 0;
         climb(p, y, rows);
         if (sum_of(p) > p->target[3])
@@ -360,6 +377,7 @@ static int solve_vector(vector_problem *p)
         if (share * EPS_FACTOR < EPS_LEAST) {
             for (size_t i = 0; i < p->n; i++)
                 p->currents[i] = clamp(p->conductance[i] * dot(p->rows + 4 * i, y, rows), p->lower[i], p->upper[i]);
+            lower_to_sum(p);
             return reached(p);
         }
     }

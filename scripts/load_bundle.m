@@ -1031,7 +1031,7 @@ function values = read_npy(file, bytes, name, kind)
     header_bytes = fread(file, 1, 'uint16');
     header = fread(file, [1, header_bytes], 'uint8=>char');
     found = regexp(header, ['''descr'': ''<(f8|i8)'', ''fortran_order'': False, ' ...
-                            '''shape'': \(([0-9, ]*)\)'], 'tokens', 'once');
+                            '''shape'': \(([0-9, ]*)\),? *\}\s*$'], 'tokens', 'once');
     if isempty(found) || ~strcmp(found{1}, kind)
         error('fluxform:bundle', '%s must hold numbers of kind %s in C order', name, kind);
     end

@@ -63,9 +63,10 @@ impl Origin {
         self.0.clone().finalize().into()
     }
 
-    /// The digest of an entry of this origin in `folder`.
-    fn digest(&self, folder: &Dir) -> [u8; DIGEST] {
-        self.clone().and(&folder.identity()).0.finalize().into()
+    /// The digest of entry `name` of this origin in `folder`.
+    fn digest(&self, folder: &Dir, name: &str) -> [u8; DIGEST] {
+        let entry = self.clone().and(&folder.identity()).and(name.as_bytes());
+        entry.0.finalize().into()
     }
 }
 
@@ -141,7 +142,7 @@ impl Store {
         // Not forced to the disk: an entry that a power cut tears is noticed and computed again.
         let _ = atomic::put(&dir, name, false, |out| {
             out.write_all(MAGIC)?;
-            out.write_all(&origin.digest(&dir))?;
+            out.write_all(&origin.digest(&dir, name))?;
             out.write_all(&Sha256::digest(bytes))?;
             out.write_all(bytes)
         });
@@ -187,7 +188,7 @@ fn payload(folder: &Dir, name: &str, origin: &Origin) -> Option<Vec<u8>> {
     file.read_exact(&mut head).ok()?;
     let (magic, digests) = head.split_at(MAGIC.len());
     let (of_origin, of_value) = digests.split_at(DIGEST);
-    if magic != MAGIC || of_origin != origin.digest(folder) {
+    if magic != MAGIC || of_origin != origin.digest(folder, name) {
         return None;
     }
     let mut bytes = Vec::new();
@@ -268,6 +269,15 @@ mod tests {
         ] {
             assert!(store.recall::<Vec<f64>>("steel", &other).is_none());
         }
+    }
+
+    #[test]
+    #[allow(clippy::disallowed_methods)] // a test's own files
+    fn an_entry_under_the_name_of_another_is_not_used() {
+        let origin = Origin::of_build("a");
+        let (folder, store, file) = kept(&origin);
+        lay(folder.path(), "wedge.pull", &std::fs::read(&file).unwrap());
+        assert!(!store.holds("wedge.pull", &origin) && store.holds("steel", &origin));
     }
 
     /// A value with its right digest, in a folder that came from elsewhere.

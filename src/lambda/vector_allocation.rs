@@ -29,7 +29,8 @@ use super::allocation::{Allocator, AllocatorError, Reach};
 const EPS_FIRST: f64 = 1e-7;
 const EPS_LEAST: f64 = 1e-14;
 const EPS_FACTOR: f64 = 1e-3;
-/// `eps` of the currents' sum relative to that of the force: the limit comes before the force.
+/// `eps` of the currents' sum relative to that of the force: the limit comes before the force. Divided by how many
+/// times the force is what all limits reach, since the multipliers grow with it.
 const EPS_SUM: f64 = 1e-6;
 /// Newton steps for one `eps`, at most; each changes which coils are at a limit, so few are needed.
 const STEPS: usize = 60;
@@ -195,16 +196,12 @@ impl VectorAllocator {
             .zip(&self.conductance)
             .map(|(h, c)| c * dot(h, h, 3))
             .sum();
-        let stiffness: f64 = self.conductance.iter().sum();
+        let within_reach = (self.most() / dot(target, target, 3).sqrt()).min(1.0);
+        let of_sum = EPS_SUM * within_reach * self.conductance.iter().sum::<f64>();
         let mut y = [0.0; 4];
         let mut share = EPS_FIRST;
         loop {
-            let eps = [
-                share * size,
-                share * size,
-                share * size,
-                EPS_SUM * share * stiffness,
-            ];
+            let eps = [share * size, share * size, share * size, share * of_sum];
             let mut rows = 3;
             y[3] = 0.0;
             self.climb(&mut y, rows, target, &eps);
@@ -220,9 +217,34 @@ impl VectorAllocator {
             }
             if share * EPS_FACTOR < EPS_LEAST {
                 self.fill(&y, rows);
+                self.lower_to(target[3]);
                 return (self.reach(target), false);
             }
             share *= EPS_FACTOR;
+        }
+    }
+
+    /// A bound of every force within the limits, in the rows' norm.
+    fn most(&self) -> f64 {
+        let coils = self.rows.iter().enumerate();
+        coils
+            .map(|(i, h)| {
+                let (lower, upper) = self.limits.limits_a(i);
+                dot(h, h, 3).sqrt() * upper.max(-lower)
+            })
+            .sum()
+    }
+
+    /// Brings all currents nearer to their lower limits, by the same share, until their sum is `total_a` at most.
+    fn lower_to(&mut self, total_a: f64) {
+        let least: f64 = (0..self.coils()).map(|i| self.limits.limits_a(i).0).sum();
+        let sum: f64 = self.currents.iter().sum();
+        if sum > total_a {
+            let share = (total_a - least) / (sum - least);
+            for (i, current) in self.currents.iter_mut().enumerate() {
+                let (lower, _) = self.limits.limits_a(i);
+                *current = lower + share * (*current - lower);
+            }
         }
     }
 

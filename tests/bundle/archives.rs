@@ -156,6 +156,12 @@ const DAMAGES: &[Damage] = &[
     ("a voltage of another kind", |a| {
         a.reword("voltage_v", "<f8", "<i8");
     }),
+    ("a header that does not end", |a| {
+        a.reword("resistance_ohm", "}", " ")
+    }),
+    ("a header of more keys", |a| {
+        a.reword("resistance_ohm", ", }", ",x}")
+    }),
 ];
 
 /// Bundles with such archives, their digests sealed.

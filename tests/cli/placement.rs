@@ -67,6 +67,26 @@ fn an_object_above_the_workspace_is_refused_with_the_translation_that_brings_it_
 }
 
 #[test]
+fn an_object_within_the_workspace_whose_forces_are_too_weak_is_not_moved() {
+    let place = Place::new();
+    let weak = format!("name = \"weak\"\nprimitive = \"flat\"\nheight_mm = 25.0\n{GRID}");
+    place.write("weak.toml", &weak);
+    let seed = std::fs::read_to_string(fluxform_testing::root().join(SEED)).unwrap();
+    let weakened = seed.replace("\ncurrent_max_a = 2.0", "\ncurrent_max_a = 1e-6");
+    assert_ne!(weakened, seed);
+    place.write("weak_seed.toml", &weakened);
+    let refused = place
+        .run(&["lambda", "weak_seed.toml", "weak.toml"])
+        .ends(4)
+        .says(&[
+            "error[E409]",
+            "lies within the workspace",
+            "allow more current",
+        ]);
+    assert!(!refused.err.contains("--translate"), "{}", refused.err);
+}
+
+#[test]
 fn a_few_points_outside_are_a_warning() {
     let place = Place::new();
     let grid = "[points]\nx_mm = [-55.0, 55.0, 23]\ny_mm = [-50.0, 50.0, 9]\n";

@@ -219,6 +219,34 @@ fn currents_are_those_of_the_exhaustive_search() {
     assert_eq!(unproven, 0);
 }
 
+#[test]
+fn a_force_far_beyond_reach_keeps_the_limits() {
+    let mut random = Random::new(17);
+    for _ in 0..3000 {
+        let mut problem = Problem::random(&mut random);
+        let coils = 2 + (random.unit() * 23.0) as usize;
+        let force = |random: &mut Random| {
+            std::array::from_fn(|_| (random.unit() - 0.5) * 10_f64.powf(-4.0 * random.unit()))
+        };
+        problem.force_n_per_a = (0..coils).map(|_| force(&mut random)).collect();
+        problem.resistance_ohm = (0..coils).map(|_| 1.0 + 6.0 * random.unit()).collect();
+        problem.upper_a = (0..coils).map(|_| 3.0 * random.unit()).collect();
+        problem.lower_a = vec![0.0; coils];
+        let most: f64 = problem.upper_a.iter().sum();
+        problem.total_a = Some(most * random.unit());
+        let times = 10_f64.powf(9.0 * random.unit());
+        problem.requested_n = problem.requested_n.map(|f| f * times);
+        let (currents, _) = problem.solve();
+        assert!(
+            problem.within_limits(&currents, 1e-9),
+            "{} A of {:?} A for {:?}",
+            currents.iter().sum::<f64>(),
+            problem.total_a,
+            problem.requested_n
+        );
+    }
+}
+
 /// An array of coils like dipoles on a square grid, the finger above it.
 fn array(side: usize, position_m: [f64; 3]) -> Vec<[f64; 3]> {
     let pitch_m = 0.05;

@@ -123,7 +123,16 @@ impl WriteError {
 
     /// Sorts an I/O error by what the user can do about it.
     pub fn from_io(action: &'static str, path: &Path, source: io::Error) -> Self {
-        let path = path.to_path_buf();
+        let path = match source.kind() {
+            // A part of the path, as a rule: the first that is something else.
+            io::ErrorKind::NotADirectory => path
+                .ancestors()
+                .filter(|part| part.symlink_metadata().is_ok())
+                .find(|part| !part.is_dir())
+                .unwrap_or(path),
+            _ => path,
+        }
+        .to_path_buf();
         match source.kind() {
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
                 Self::ReadOnly { path }

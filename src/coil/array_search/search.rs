@@ -12,6 +12,10 @@ use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics,
 use super::space::{Choice, Space, choices};
 use crate::limits::LimitName;
 
+/// Why no search begins where no key varies.
+pub const NOTHING_SEARCHED: &str =
+    "nothing is searched: add [search] with a range for a key, like array.pitch_mm = [40, 60]";
+
 /// The settings of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
@@ -216,9 +220,9 @@ pub fn problems<'a>(
     }
     match faults.into_iter().next() {
         Some(refused) if problems.is_empty() => Err(refused),
-        _ if problems.len() == 1 && problems[0].space.axes().is_empty() => Err(Refused::Space(
-            "nothing is searched: add [search] with a range for a key, like array.pitch_mm = [40, 60]".to_owned(),
-        )),
+        _ if problems.len() == 1 && problems[0].space.axes().is_empty() => {
+            Err(Refused::Space(NOTHING_SEARCHED.to_owned()))
+        }
         _ => Ok(problems),
     }
 }

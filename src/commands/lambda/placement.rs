@@ -13,6 +13,9 @@ pub const OUTSIDE_MAX: f64 = 2.0 / 3.0;
 /// An object this many times larger or smaller than the workspace is in another unit.
 const OUT_OF_PROPORTION: f64 = 8.0;
 
+/// Rounding of tenths of a millimetre, in these.
+const ROUNDING: f64 = 1e-6;
+
 /// An object, its points and the design that is to render them.
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'a> {
@@ -105,7 +108,7 @@ impl Placed<'_> {
         [space.x_m, space.y_m, space.z_m]
     }
 
-    /// The shift that brings the object into the workspace, in words.
+    /// What helps, in words: the shift that brings the object into the workspace, or that none is needed.
     fn cure(&self) -> String {
         let axes = self.axes();
         let ends = [0, 1, 2].map(|k| {
@@ -130,11 +133,25 @@ impl Placed<'_> {
         if !fits {
             return self.fitted(size_m);
         }
+        let by_m = [0, 1, 2].map(|k| {
+            let ([from, to], axis) = (ends[k], axes[k]);
+            (axis.from - from).max(0.0) + (axis.to - to).min(0.0)
+        });
+        if by_m == [0.0; 3] {
+            return "it lies within the workspace, where the coils' forces are too weak: allow more current, wind more \
+                    turns, take a larger magnet, or bring object and workspace nearer to the coils"
+                .to_owned();
+        }
         let given_m = self.document.placement.translate_m;
         let moved = [0, 1, 2].map(|k| {
-            let ([from, to], axis) = (ends[k], axes[k]);
-            let by = (axis.from - from).max(0.0) + (axis.to - to).min(0.0);
-            format!("{}", ((given_m[k] + by) * 1e4).round() / 10.0)
+            // Tenths of a millimetre, rounded inwards.
+            let tenths = (given_m[k] + by_m[k]) * 1e4;
+            let rounded = match by_m[k] {
+                up if up > 0.0 => (tenths - ROUNDING).ceil(),
+                0.0 => tenths.round(),
+                _ => (tenths + ROUNDING).floor(),
+            };
+            format!("{}", rounded / 10.0)
         });
         let seat = &self.document.placement.seat;
         if seat.fit.is_some() || seat.center || seat.rest_on_m.is_some() {

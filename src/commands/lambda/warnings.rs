@@ -78,8 +78,8 @@ fn of_status(status: Status) -> Option<&'static str> {
         ),
         Status::NothingRendered => Some(
             "no current within the limits pushes the magnet up at these points: lambda is null; \
-             check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a and \
-             the object's place",
+             check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a, the \
+             coils that are broken and the object's place",
         ),
         Status::Stalled => Some(
             "the path could not be followed to its end: numbers beyond its last breakpoint are \

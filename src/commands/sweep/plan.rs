@@ -8,8 +8,10 @@ use super::point::toml_value;
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::sweep::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
+use crate::coil::array_search::search::NOTHING_SEARCHED;
 use crate::commands::discretize::with_surface;
 use crate::design::named_file::{NamedFile, Role};
+use crate::design::search::SearchSpace;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Severity, source};
 use crate::scene::named_files::NamedContent;
@@ -71,7 +73,8 @@ impl PlanRequest {
 /// when it is computed.
 ///
 /// # Errors
-/// Values that the design's keys do not take; files that it names that cannot be read.
+/// Values that the design's keys do not take; files that it names that cannot be read; a search of arrays in which
+/// nothing varies.
 pub fn plan(
     design: &Design,
     text: String,
@@ -80,6 +83,13 @@ pub fn plan(
 ) -> Result<PlanFile, RunError> {
     let path = PathBuf::from(&input.path);
     check_values(&text, &path, &request.axes)?;
+    let searched = request
+        .axes
+        .iter()
+        .any(|axis| axis.key.starts_with("search"));
+    if request.array.is_some() && !searched && design.search == SearchSpace::default() {
+        return Err(RunError::Input(NOTHING_SEARCHED.to_owned()));
+    }
     let mut inputs = vec![input];
     for file in named_files(design, &path, &request.axes) {
         inputs.push(NamedContent::read(file)?.input());
@@ -217,12 +227,16 @@ mod tests {
                           outer_diameter_mm = 38.0\nlength_mm = 70.0\n[wire]\ndiameter_mm = 0.7\n";
 
     fn planned(settings: &[&str]) -> Result<PlanFile, String> {
+        planned_for(None, settings)
+    }
+
+    fn planned_for(array: Option<ArrayTask>, settings: &[&str]) -> Result<PlanFile, String> {
         let request = PlanRequest {
             axes: settings.iter().map(|s| axis::parse(s).unwrap()).collect(),
             mode: Mode::Evaluate,
             seed: 0,
             tolerance: None,
-            array: None,
+            array,
         };
         request.check()?;
         let (design, _) = Design::from_toml(DESIGN, Path::new("a.toml"), Need::SWEEP).unwrap();
@@ -259,6 +273,18 @@ mod tests {
             "coil.outer_diameter_mm=12:38:2",
         ]);
         assert_eq!(plan.unwrap().points, 5 * 14);
+    }
+
+    #[test]
+    fn an_array_in_which_nothing_varies_is_not_planned() {
+        let task = ArrayTask {
+            shapes: Vec::new(),
+            evaluations: 10,
+        };
+        let said = planned_for(Some(task.clone()), &["coil.turns=700,1300"]).unwrap_err();
+        assert_eq!(said, NOTHING_SEARCHED);
+        let varied = "search.array.pitch_mm=[40,60],[40,50]";
+        assert!(planned_for(Some(task), &[varied]).is_ok());
     }
 
     #[test]

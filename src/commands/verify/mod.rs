@@ -277,7 +277,8 @@ impl<'a> Verifier<'a> {
     ) -> Result<Option<Arc<Expected>>, RunError> {
         let Some(shape) = &sources.shape else {
             all.unchecked.push(format!(
-                "points, pages, plots, texts and stated errors: {}",
+                "points, requested directions, what is derived from the force constant or stated for \
+                 uncertainties, pages, plots, texts and stated errors: {}",
                 sources.without_shape()
             ));
             return Ok(None);

@@ -161,13 +161,22 @@ class Dual:
         against = np.where(self.at == 0, np.abs(pull) <= slack, self.at * pull >= -slack)
         return bool(np.all(against))
 
+    def lower_to_sum(self):
+        """Brings all currents nearer to their lower limits until their sum is within its limit."""
+        above = self.currents - self.lower
+        if np.sum(self.currents) > self.target[3]:
+            self.currents = self.lower + above * (self.target[3] - np.sum(self.lower)) / np.sum(above)
+
     def solve(self):
         """Whether the currents, which it leaves, give the force."""
         size = np.sum(self.conductance * np.sum(self.rows[:, :3] ** 2, axis=1))
-        stiffness = np.sum(self.conductance)
+        most = np.sum(np.linalg.norm(self.rows[:, :3], axis=1) * np.maximum(self.upper, -self.lower))
+        # The multipliers grow with the force beyond reach; the sum's limit holds all the same.
+        within_reach = min(most / np.linalg.norm(self.target[:3]), 1.0)
+        of_sum = self.EPS_SUM * within_reach * np.sum(self.conductance)
         y, share = np.zeros(4), self.EPS_FIRST
         while True:
-            self.eps = share * np.array([size, size, size, self.EPS_SUM * stiffness])
+            self.eps = share * np.array([size, size, size, of_sum])
             n, y[3] = 3, 0.0
             self.climb(y, n)
             if np.sum(self.currents) > self.target[3]:
@@ -180,6 +189,7 @@ class Dual:
             if share * self.EPS_FACTOR < self.EPS_LEAST:
                 alone = self.conductance * (self.rows[:, :n] @ y[:n])
                 self.currents = np.clip(alone, self.lower, self.upper)
+                self.lower_to_sum()
                 return self.reached()
             share *= self.EPS_FACTOR
 

@@ -151,7 +151,7 @@ fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
         "tolerance",
         &format!(
             "the same equations at resolution {last:e}; its own error: below the difference from \
-             {before:e}; finite elements agree to their 0.1 % (tests/steel)"
+             {before:e}; finite elements agree to their 0.1 % (tests/field/steel)"
         ),
         apart(&second, &finest, &air),
         rows,
