@@ -79,7 +79,7 @@ pub const fn items_a_task(count: usize) -> usize {
 #[cold]
 fn leave() {
     // A destructor that runs while the thread unwinds must not unwind again.
-    let leaves = INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && TO_ITS_END.load(Ordering::SeqCst) == 0;
+    let leaves = INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && !finishing();
     if leaves && !std::thread::panicking() {
         // No panic: the hook is not called, so nothing is printed.
         resume_unwind(Box::new(Interrupted));
@@ -112,6 +112,12 @@ pub fn to_its_end<T>(work: impl FnOnce() -> T) -> T {
     TO_ITS_END.fetch_add(1, Ordering::SeqCst);
     let _guard = Guard;
     work()
+}
+
+/// Whether work is being run [`to_its_end`].
+#[must_use]
+pub fn finishing() -> bool {
+    TO_ITS_END.load(Ordering::SeqCst) > 0
 }
 
 /// Runs `work` so that [`poll`] can end it.

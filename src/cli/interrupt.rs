@@ -21,7 +21,7 @@ use super::failure::Failure;
 use super::printer::Printer;
 use crate::RunError;
 use crate::bundle::atomic::{awaited_folder, is_writing};
-use crate::progress::{Interrupted, stop_flag, stop_requested};
+use crate::progress::{Interrupted, finishing, stop_flag, stop_requested};
 
 /// Whether a signal ends the process at once: it was signalled before, or no job polls.
 static ENDS: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool::new(true)));
@@ -81,7 +81,11 @@ fn guard(common: &Common) {
             Printer::new(common)
                 .notice(&format!("waiting for another run in {}", folder.display()));
         }
-        impatience += u32::from(stop_requested());
+        // What a stopped job still writes comes first.
+        impatience = match finishing() {
+            true => 0,
+            false => impatience + u32::from(stop_requested()),
+        };
         if impatience > PATIENCE && !is_writing() {
             if ENDED.swap(true, Ordering::SeqCst) {
                 return;

@@ -381,6 +381,32 @@ fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
     }
 }
 
+/// A stop of a search of arrays: the best so far is in every file that was requested.
+#[test]
+fn a_stopped_search_writes_its_files() {
+    let place = Place::new();
+    let search = "[search]\narray.pitch_mm = [40.0, 60.0]\ncoil.length_mm = [60.0, 100.0]\n";
+    place.write("air.toml", &(array(3, "", 100.0) + search));
+    let files = ["best.toml", "journal.json", "front.csv", "page.html"];
+    let mut args = vec!["optimize", "air.toml", "--for", "shapes/flat.toml"];
+    args.extend(["--evaluations", "100000", "--starts", "30"]);
+    for (flag, file) in ["--out", "--journal", "--front", "--report"].iter().zip(files) {
+        args.extend([flag, file]);
+    }
+    // A loaded machine may need long for the first array.
+    for after_ms in [2000, 8000, 30_000] {
+        let said = said_of(&place, &args, after_ms);
+        let missing = files.iter().filter(|file| !place.path(file).is_file());
+        let missing: Vec<_> = missing.collect();
+        if missing.is_empty() {
+            place.run(&["evaluate", "best.toml"]).ends(0);
+            return;
+        }
+        assert_eq!(missing.len(), files.len(), "{missing:?}: {said}");
+    }
+    panic!("no file was written after a stop");
+}
+
 /// What `args` says on stderr within some time.
 fn said_of(place: &Place, args: &[&str], after_ms: u64) -> String {
     let Answer { code, said, .. } = answer(place, args, after_ms);

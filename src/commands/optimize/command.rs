@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::array::command::{ArrayFlags, Shared, mark};
-use super::{Dimension, Document, OptimizeRequest, optimize, page};
+use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
 use crate::RunError;
 use crate::bundle::atomic::{Overwrite, check_distinct};
 use crate::cli::args::{Tolerance, Writing};
@@ -18,6 +18,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::{accuracy_check, begin, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
+use crate::progress::to_its_end;
 
 /// Find the best coil within a design's limits
 ///
@@ -81,6 +82,16 @@ pub struct Optimize {
     array: ArrayFlags,
 }
 
+/// The files of a search.
+struct Files<'a> {
+    /// The first line of what is made of the design.
+    mark: &'a str,
+    /// What the design may replace.
+    overwrite: &'a Overwrite,
+    page: Option<Picture<'a>>,
+    plot: Option<Picture<'a>>,
+}
+
 fn starts(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(starts @ 1..=1_000_000) => Ok(starts),
@@ -142,33 +153,46 @@ impl Optimize {
         };
         let result = optimize(&source, inputs, &self.request(), &bar)?;
         drop(bar);
-        for warning in &result.warnings {
-            printer.warning(warning);
-        }
-        let text = result
-            .design_text
-            .as_ref()
-            .map(|text| format!("{mark}\n{text}"));
-        let mut place = match &text {
-            Some(text) => write_to(self.out.as_ref(), &overwrite, printer, |out| {
-                out.write_all(text.as_bytes())
-            })?,
-            None => Stream::Output,
+        let files = Files {
+            mark: &mark,
+            overwrite: &overwrite,
+            page,
+            plot,
         };
-        if let Some(page) = &page {
-            place = place.or(page.write(&result.inputs, &page::html(&result), printer)?);
-        }
-        if let (Some(plot), Some(picture)) = (&plot, &result.picture) {
-            place = place.or(plot.draw(&result.inputs, &picture.drawing(), printer)?);
-        }
-        let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))?;
+        // A stop that comes now would lose the coil that was found.
+        to_its_end(|| self.write(&files, &result, printer))?;
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }
         let missed =
             (!result.accuracy_reached).then(|| "the best coil: see its accuracy".to_owned());
         accuracy_check(missed.as_slice())
+    }
+
+    /// Writes every file of the result, and the summary.
+    fn write(
+        &self,
+        files: &Files<'_>,
+        result: &Optimization,
+        printer: &Printer,
+    ) -> Result<(), Failure> {
+        for warning in &result.warnings {
+            printer.warning(warning);
+        }
+        let mut place = match &result.design_text {
+            Some(text) => write_to(self.out.as_ref(), files.overwrite, printer, |out| {
+                write!(out, "{}\n{text}", files.mark)
+            })?,
+            None => Stream::Output,
+        };
+        if let Some(page) = &files.page {
+            place = place.or(page.write(&result.inputs, &page::html(result), printer)?);
+        }
+        if let (Some(plot), Some(picture)) = (&files.plot, &result.picture) {
+            place = place.or(plot.draw(&result.inputs, &picture.drawing(), printer)?);
+        }
+        let json = printer.with_warnings(result);
+        printer.summary(place, &json, || text::summary(result, self.out.as_ref()))
     }
 
     fn request(&self) -> OptimizeRequest {

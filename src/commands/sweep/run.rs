@@ -13,7 +13,7 @@ use crate::RunError;
 use crate::bundle::atomic::WriteError;
 use crate::bundle::read_bounded::digest_plain;
 use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
-use crate::progress::Progress;
+use crate::progress::{Progress, to_its_end};
 use crate::scene::cost::Cost;
 use crate::scene::sources::ShapeSource;
 
@@ -84,7 +84,8 @@ pub fn run(
                 }
                 None => {
                     let point = sweep.point(index);
-                    store.write(&point, force)?;
+                    // Also after a stop: what was finished is kept.
+                    to_its_end(|| store.write(&point, force))?;
                     point
                 }
             };

@@ -29,7 +29,7 @@ use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::lambda::Criterion;
 use crate::numerics::mixed_search::Settings;
-use crate::progress::{Interrupted, Progress};
+use crate::progress::{Interrupted, Progress, to_its_end};
 use crate::scene::cost;
 
 /// An array for shapes instead of a coil.
@@ -145,17 +145,21 @@ impl ArrayFlags {
         let seconds = bar.take_seconds();
         drop(physics);
         drop(bar);
-        self.write_journal(&journal, &outputs.mark, &outputs.marked, printer)?;
-        let result = ended?;
-        for warning in &result.warnings {
-            printer.warning(warning);
-        }
-        let place = self.write(shared, &outputs, &result, printer)?;
-        let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || {
-            text::summary(&result, shared.out, &seconds)
+        // Writing polls, and would give up after a stop what the search still answered.
+        let status = to_its_end(|| -> Result<_, Failure> {
+            self.write_journal(&journal, &outputs.mark, &outputs.marked, printer)?;
+            let result = ended?;
+            for warning in &result.warnings {
+                printer.warning(warning);
+            }
+            let place = self.write(shared, &outputs, &result, printer)?;
+            let json = printer.with_warnings(&result);
+            printer.summary(place, &json, || {
+                text::summary(&result, shared.out, &seconds)
+            })?;
+            Ok(result.status)
         })?;
-        match result.status {
+        match status {
             ArrayEnding::Done => Ok(()),
             ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
             ArrayEnding::Infeasible => Err(Failure::Unmet(

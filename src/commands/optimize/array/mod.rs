@@ -438,10 +438,11 @@ fn levels(
     }];
     let made = &found.problem.space;
     let coarse = match best.level {
-        Level::Full => {
+        // After an interruption nothing more is computed.
+        Level::Full if !found.interrupted => {
             physics.compute(&made.design(&best.x), made.raised_m(&best.x), Level::Search)?
         }
-        Level::Search => None,
+        Level::Full | Level::Search => None,
     };
     if let Some(coarse) = coarse {
         let (given, now) = (
