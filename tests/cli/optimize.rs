@@ -152,6 +152,32 @@ fn a_wound_coil_has_whole_layers_and_is_no_better_than_a_free_one() {
     }
 }
 
+/// Every number of turns was gone through for minutes, and a coil that there is was not found.
+#[test]
+fn a_given_length_is_wound_in_its_own_turns() {
+    let place = Place::new();
+    let design = |length_mm: f64| {
+        format!(
+            "name = \"given\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\n\
+             length_mm = {length_mm:?}\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 1\n\
+             [supply]\ncurrent_max_a = 2.0\n[limits]\nouter_diameter_max_mm = 38.0\n\
+             resistance_max_ohm = 6.0\n[target]\nheight_mm = 30.0\n"
+        )
+    };
+    let args = ["optimize", "given.toml", "--wound", "--fix", "length_mm"];
+    place.write("given.toml", &design(98.0));
+    let best = place.run(&[&args[..], &["--format", "json"]].concat());
+    let best = best.ends(0).json();
+    assert_eq!(best["coil"]["turns_per_layer"], 140);
+    assert_eq!(best["certificate"]["kind"], "global");
+    near(number(&best, "coil/length_m"), 0.098, 1e-12);
+    place.write("given.toml", &design(100.0));
+    place
+        .run(&args)
+        .ends(4)
+        .says(&["99.400000 mm (142 turns", "100.100000 mm (143 turns"]);
+}
+
 #[test]
 fn a_coil_wider_than_the_array_s_pitch_was_written() {
     let place = Place::new();

@@ -24,6 +24,11 @@ pub(super) fn whole(ratio: f64) -> u64 {
     (ratio + WHOLE).floor().clamp(1.0, 1e15) as u64
 }
 
+/// The least number of whole wires, at least one, that is not below a ratio.
+pub(super) fn least(ratio: f64) -> u64 {
+    (ratio - WHOLE).ceil().max(1.0) as u64
+}
+
 /// One problem's coils as sets that can be bounded and taken apart.
 pub(super) trait CoilSets: Sync {
     type Set: Send + Sync;

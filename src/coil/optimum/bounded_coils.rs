@@ -4,13 +4,14 @@
 //! numbers; what remains is a search in the bore alone, itself bounded. Nothing is rounded to.
 
 use super::best_bore::Bores;
-use super::best_first::{CoilSets, Parts, WHOLE, whole};
+use super::best_first::{CoilSets, Parts, WHOLE, least, whole};
 use super::branch_and_bound::{self, GAP};
 use super::candidates::{Leaf, SHARE};
 use super::domain::Domain;
 use super::interval_bounds::{Bounding, Cell, Multipliers};
 use super::local_searches::Solved;
 use super::problem::Problem;
+use fluxform_base::progress::poll;
 use fluxform_numerics::interval::Interval;
 
 const USED: f64 = 0.9;
@@ -100,7 +101,7 @@ impl<'a> BoundedCoils<'a> {
             (&mut coils.layers, cell.depth),
             (&mut coils.turns, cell.length),
         ] {
-            range[0] = range[0].max((span.lo / wire_m - WHOLE).ceil().max(1.0) as u64);
+            range[0] = range[0].max(least(span.lo / wire_m));
             range[1] = range[1].min((span.hi / wire_m + WHOLE).floor() as u64);
             if range[0] > range[1] {
                 return None;
@@ -125,6 +126,7 @@ impl<'a> BoundedCoils<'a> {
         let mut stack = vec![cell];
         let mut count = 0;
         while let Some(cell) = stack.pop() {
+            poll();
             count += 1;
             parts.cells += 1;
             let Some(cell) = self.bounding.contracted(cell) else {
@@ -157,10 +159,11 @@ impl CoilSets for BoundedCoils<'_> {
 
     fn all(&self, enough_ln: f64) -> Parts<LatticeBox> {
         let all = branch_and_bound::whole(&self.bounding.domain);
-        let most = |hi: f64| whole(hi / self.wire_m());
+        // The limits' contraction knows no least length.
+        let range = |span: Interval| [least(span.lo / self.wire_m()), whole(span.hi / self.wire_m())];
         let all = LatticeBox {
-            layers: [1, most(all.depth.hi)],
-            turns: [1, most(all.length.hi)],
+            layers: range(all.depth),
+            turns: range(all.length),
             inner: all.inner,
         };
         Parts {

@@ -200,7 +200,8 @@ impl Domain {
     }
 }
 
-fn mm(length_m: f64) -> String {
+/// Millimetres of a length, as messages have them.
+pub(super) fn mm(length_m: f64) -> String {
     format!("{:.6} mm", length_m * 1e3)
 }
 

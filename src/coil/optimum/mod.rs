@@ -58,6 +58,7 @@ mod surrogate;
 pub mod task;
 #[cfg(test)]
 mod tests;
+mod whole_sizes;
 pub mod wound;
 
 pub use local_searches::Settings;

@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 
 use super::best_bore::{Bores, summit};
-use super::best_first::{CoilSets, Parts, Strongest, WHOLE, whole};
+use super::best_first::{CoilSets, Parts, Strongest, least, whole};
 use super::candidates::{self, Leaf, around_optimum, rounded_status};
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
@@ -145,7 +145,7 @@ impl<'a> ScreenedCoils<'a> {
             domain,
             narrow,
             layers: [1, whole(room_m / wire_m)],
-            turns: [(shortest - WHOLE).ceil().max(1.0) as u64, whole(longest)],
+            turns: [least(shortest), whole(longest)],
         };
         if let (true, Some(window)) = (coils.count() > PAIRS, optimum) {
             // Too many: those about the continuous optimum.

@@ -9,10 +9,11 @@ use super::branch_and_bound::{self, GAP};
 use super::candidates::{self, SHARE, around_optimum, rounded_status};
 use super::local_searches::{self, Settings, Solved};
 use super::model::CoilModel;
-use super::outcome::{BestCoil, Certificate, CertificateKind, Outcome};
+use super::outcome::{BestCoil, Certificate, CertificateKind, OptimumStatus, Outcome};
 use super::problem::Task;
 use super::screened_coils;
 use super::search;
+use super::whole_sizes::of_whole_wires;
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Maximises |force| over the coils that can be wound within `task`. Coils for which no bounds
@@ -26,6 +27,12 @@ pub fn optimise_wound(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Outcome, Interrupted> {
+    let task = &match of_whole_wires(task) {
+        Ok(task) => task,
+        Err(refused) => {
+            return Ok(candidates::none(OptimumStatus::Contradictory(refused), &[]));
+        }
+    };
     let problems = match search::solve_all(model, task, settings, progress)? {
         Ok(problems) => problems,
         Err((status, problems)) => return Ok(candidates::none(status, &problems)),
