@@ -268,6 +268,29 @@ fn an_interrupted_run_keeps_its_points() {
 }
 
 #[test]
+fn a_partial_merge_leaves_a_fuller_table_alone() {
+    let place = Place::new();
+    planned(&place);
+    for (shard, out) in [("1/7", "some"), ("1/3", "more")] {
+        let run = ["sweep", "run", "plan.json", "--shard", shard, "--out", out];
+        place.run(&run).ends(0);
+    }
+    let merge = |folder| ["sweep", "merge", "plan.json", folder, "--partial"];
+    place.run(&merge("some")).ends(0);
+    place.run(&merge("more")).ends(0);
+    let fuller = place.read("sweep.csv");
+    place
+        .run(&merge("some"))
+        .ends(4)
+        .says(&["fuller", "misses 182", "234 are missing", "--force"]);
+    assert!(place.read("sweep.csv") == fuller);
+    place
+        .run(&[&merge("some")[..], &["--force"]].concat())
+        .ends(0);
+    assert!(place.read("sweep.csv") != fuller);
+}
+
+#[test]
 fn torn_points_are_computed_again_and_foreign_ones_are_left_alone() {
     let place = Place::new();
     planned(&place);

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
+use crate::bundle::read_bounded::read_plain;
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
     MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, columns,
@@ -29,6 +30,8 @@ pub(crate) use landscape::check_drawable;
 
 /// Points read at a time.
 const PORTION: u64 = 4096;
+/// The largest sidecar, bytes.
+const SIDECAR_MAX_BYTES: u64 = 1 << 20;
 /// Ranges of missing points that are named.
 const NAMED: usize = 10;
 /// The costs that the force is compared with: name, unit, column of the front's table.
@@ -213,6 +216,10 @@ pub fn merge(
     if let Some(error) = refused {
         return Err(error);
     }
+    let [.., sidecar] = files.paths();
+    if request.partial && !files.force {
+        refuse_fuller(&files.table, &sidecar, gathered.missing_count())?;
+    }
     let mut listed = vec![FileEntry::new(table, written?)];
     let (fronts, among_met) = fronts(&gathered.briefs);
     let plot = plot(plan, &gathered.briefs, &fronts, among_met);
@@ -237,6 +244,23 @@ pub fn merge(
         .page
         .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
     Ok(report(plan, request, summary, &gathered, page))
+}
+
+/// Refuses to replace the merged sweep of `sidecar`, the same plan's, where it misses fewer points than `missing`.
+fn refuse_fuller(table: &Path, sidecar: &Path, missing: u64) -> Result<(), RunError> {
+    let bytes = read_plain(sidecar, SIDECAR_MAX_BYTES).ok();
+    let there = bytes.and_then(|bytes| serde_json::from_slice::<MergeSummary>(&bytes).ok());
+    match there {
+        Some(there) if there.missing < missing => Err(WriteError::OutputExists {
+            path: table.to_path_buf(),
+            reason: format!(
+                "and is fuller: of {} points it misses {}, and {missing} are missing now",
+                there.points, there.missing
+            ),
+        }
+        .into()),
+        Some(_) | None => Ok(()),
+    }
 }
 
 /// Writes the table of the designs on a front.

@@ -29,7 +29,7 @@ use crate::cli::values::{self, FileArgument};
 /// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
 /// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
-/// warning. Points of another plan are refused.
+/// warning; a table with fewer missing is replaced with --force alone. Points of another plan are refused.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
