@@ -103,6 +103,34 @@ fn evaluate_says_the_same_of_the_design_that_was_written() {
     }
 }
 
+/// A limit of 16 or more digits was rounded to 15, and the coil was larger than that.
+#[test]
+fn sizes_keep_limits_of_seventeen_digits() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 60.0")
+        .replace(
+            "outer_diameter_max_mm = 38.0",
+            "outer_diameter_max_mm = 27.939999999999998",
+        )
+        .replace("length_max_mm = 100.0", "length_max_mm = 69.99999999999999");
+    place.write("fine.toml", &text);
+    for more in [&[][..], &["--wound"]] {
+        let args = [
+            "optimize",
+            "fine.toml",
+            "--starts",
+            "3",
+            "--out",
+            "best.toml",
+            "--force",
+        ];
+        place.run(&[&args[..], more].concat()).ends(0);
+        place.run(&["evaluate", "best.toml", "--strict"]).ends(0);
+    }
+}
+
 #[test]
 fn a_wound_coil_has_whole_layers_and_is_no_better_than_a_free_one() {
     let place = Place::new();

@@ -13,6 +13,7 @@ use crate::design::template::Template;
 use crate::design::{Design, Need, Severity};
 use crate::scene::Scene;
 use crate::scene::rated::Rated;
+use crate::units::m_from_mm;
 
 /// Excess over a limit beyond which it is no rounding, relative.
 const ROUNDING: f64 = 1e-5;
@@ -44,6 +45,26 @@ fn mm(length_m: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
+/// Millimetres whose length, as a document's are read, is at most `limit_m`: with 15 digits, or as many as it takes.
+fn at_most_mm(limit_m: f64) -> f64 {
+    let within = |value: &f64| m_from_mm(*value) <= limit_m;
+    let mut value = Some(mm(limit_m)).filter(within).unwrap_or(limit_m * 1e3);
+    while !within(&value) {
+        value = value.next_down();
+    }
+    value
+}
+
+/// The same of at least `limit_m`.
+fn at_least_mm(limit_m: f64) -> f64 {
+    let within = |value: &f64| m_from_mm(*value) >= limit_m;
+    let mut value = Some(mm(limit_m)).filter(within).unwrap_or(limit_m * 1e3);
+    while !within(&value) {
+        value = value.next_up();
+    }
+    value
+}
+
 /// Inner and outer diameter and length, mm.
 #[derive(Debug, Clone, Copy)]
 struct Sizes {
@@ -55,8 +76,8 @@ struct Sizes {
 impl Sizes {
     fn new(best: &BestCoil, task: &Task) -> Self {
         let window = &best.window;
-        let least = task.bore_min_m(&best.strand).map_or(0.0, mm);
-        let most = |limit: Option<f64>| limit.map_or(f64::INFINITY, mm);
+        let least = task.bore_min_m(&best.strand).map_or(0.0, at_least_mm);
+        let most = |limit: Option<f64>| limit.map_or(f64::INFINITY, at_most_mm);
         let outer_max = most(task.outer_max().map(|(_, most_m)| most_m));
         let length_max = most(task.limits.length_max_m);
         let within = |outer: f64| outer.min(outer_max);
@@ -78,7 +99,7 @@ impl Sizes {
         }
         Self {
             inner,
-            outer: rounded(inner + build),
+            outer: within(rounded(inner + build)),
             length: rounded(whole.turns_per_layer as f64 * wire).min(length_max),
         }
     }
@@ -204,4 +225,21 @@ fn text_of(
 /// A coil that cannot be computed.
 pub(super) fn rated(design: &Design, tolerance: Option<f64>) -> Result<Rated, RunError> {
     Rated::new(&Scene::with_tolerance(design, tolerance)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A largest diameter of 27.939999999999998 mm was once written as 27.94 mm.
+    #[test]
+    fn a_limit_of_seventeen_digits_is_kept() {
+        for limit_mm in [27.939999999999998, 69.99999999999999, 38.0, 0.7, 1.3] {
+            let limit_m = m_from_mm(limit_mm);
+            let (most, least) = (at_most_mm(limit_m), at_least_mm(limit_m));
+            assert!(m_from_mm(most) <= limit_m && limit_m <= m_from_mm(least));
+            assert!((least / most - 1.0).abs() < 1e-14, "{least} {most}");
+        }
+        assert_eq!([38.0, 0.7].map(|size| at_most_mm(m_from_mm(size))), [38.0, 0.7]);
+    }
 }
