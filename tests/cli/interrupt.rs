@@ -390,7 +390,10 @@ fn a_stopped_search_writes_its_files() {
     let files = ["best.toml", "journal.json", "front.csv", "page.html"];
     let mut args = vec!["optimize", "air.toml", "--for", "shapes/flat.toml"];
     args.extend(["--evaluations", "100000", "--starts", "30"]);
-    for (flag, file) in ["--out", "--journal", "--front", "--report"].iter().zip(files) {
+    for (flag, file) in ["--out", "--journal", "--front", "--report"]
+        .iter()
+        .zip(files)
+    {
         args.extend([flag, file]);
     }
     // A loaded machine may need long for the first array.

@@ -350,6 +350,56 @@ fn dimensions_can_be_fixed() {
 }
 
 #[test]
+fn arguments_of_another_search_were_ignored() {
+    let place = Place::new();
+    for (args, named) in [
+        (
+            &["--fix", "length_mm", "--vary", "array.pitch_mm=40:60"][..],
+            "--for",
+        ),
+        (&["--neighbours", "--smallest"], "--for"),
+        (&["--fix", "length_mm", "--evaluations", "7"], "--for"),
+        (&["--neighbours", "--journal", "j.json"], "--for"),
+        (&["--neighbours", "--front", "f.csv"], "--for"),
+        (
+            &["--neighbours", "--constant", "vector", "--lambda", "3"],
+            "--for",
+        ),
+        (&["--unit", "mm"], "--unit"),
+        (
+            &["--grid", "7x7", "--translate", "0,0,30"],
+            "--translate, --grid",
+        ),
+        (&["--for", "shapes/flat.toml", "--wound"], "--wound"),
+        (
+            &["--for", "shapes/flat.toml", "--certificate-cells", "0"],
+            "--certificate-cells",
+        ),
+        (
+            &["--for", "shapes/flat.toml", "--fix", "length_mm"],
+            "--fix",
+        ),
+        (
+            &["--for", "shapes/flat.toml", "--neighbours"],
+            "--neighbours",
+        ),
+    ] {
+        let args = [&["optimize", SEED], args].concat();
+        place.run(&args).ends(2).says(&[named]);
+    }
+    let set = ["--set", "coil.length_mm=70,80"];
+    for (args, named) in [
+        (&["--optimize", "--evaluations", "3"][..], "--for"),
+        (&["--for", "shapes/flat.toml", "--wound"], "--optimize"),
+        (&["--for", "shapes/flat.toml", "--optimize"], "--optimize"),
+    ] {
+        let args = [&["sweep", "plan", SEED], &set[..], args].concat();
+        place.run(&args).ends(2).says(&[named]);
+    }
+    assert!(!place.path("plan.json").exists());
+}
+
+#[test]
 fn a_start_outside_the_limits_changes_nothing() {
     let place = Place::new();
     let seed = place.text(SEED);

@@ -160,7 +160,12 @@ impl CoilSets for BoundedCoils<'_> {
     fn all(&self, enough_ln: f64) -> Parts<LatticeBox> {
         let all = branch_and_bound::whole(&self.bounding.domain);
         // The limits' contraction knows no least length.
-        let range = |span: Interval| [least(span.lo / self.wire_m()), whole(span.hi / self.wire_m())];
+        let range = |span: Interval| {
+            [
+                least(span.lo / self.wire_m()),
+                whole(span.hi / self.wire_m()),
+            ]
+        };
         let all = LatticeBox {
             layers: range(all.depth),
             turns: range(all.length),

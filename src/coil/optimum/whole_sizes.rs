@@ -82,7 +82,10 @@ impl Given {
                     continue;
                 }
                 let side = if off_m > 0.0 { &mut above } else { &mut below };
-                if side.as_ref().is_none_or(|(other_m, _)| off_m.abs() < *other_m) {
+                if side
+                    .as_ref()
+                    .is_none_or(|(other_m, _)| off_m.abs() < *other_m)
+                {
                     let (size, wire) = (mm(self.size_m + off_m), mm(strand.diameter_m));
                     let text = format!("{size} ({count} {} of {wire})", self.wires);
                     *side = Some((off_m.abs(), text));
@@ -142,7 +145,9 @@ mod tests {
         assert_eq!(of(diameters(0.038)), Ok(1));
         let refused = of(diameters(0.0245)).unwrap_err();
         assert!(
-            refused.message.ends_with("the nearest: 25.400000 mm (1 layers of 0.700000 mm)"),
+            refused
+                .message
+                .ends_with("the nearest: 25.400000 mm (1 layers of 0.700000 mm)"),
             "{refused:?}"
         );
     }

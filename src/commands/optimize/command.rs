@@ -48,7 +48,7 @@ pub struct Optimize {
     wound: bool,
     /// Among the array's other coils: their unpowered cores count for force and settling of the
     /// coil nearest to the centre, where the design couples them
-    #[arg(long, hide_short_help = true, conflicts_with = "shapes")]
+    #[arg(long, hide_short_help = true)]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
     /// [default: 24; with --for 3]
@@ -58,16 +58,11 @@ pub struct Optimize {
     #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
-    #[arg(long, hide_short_help = true, value_name = "KEY", value_parser = values::named::<Dimension>(), num_args = 1.., value_delimiter = ',', conflicts_with = "shapes")]
+    #[arg(long, hide_short_help = true, value_name = "KEY", value_parser = values::named::<Dimension>(), num_args = 1.., value_delimiter = ',')]
     fix: Vec<Dimension>,
-    /// Boxes of coils that proving the best may take; 0 for no proof
-    #[arg(
-        long,
-        hide_short_help = true,
-        value_name = "N",
-        default_value_t = 4_000_000
-    )]
-    certificate_cells: usize,
+    /// Boxes of coils that proving the best may take; 0 for no proof [default: 4000000]
+    #[arg(long, hide_short_help = true, value_name = "N")]
+    certificate_cells: Option<usize>,
     /// Write the design with the best coil here (TOML); `-` is standard output
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
@@ -105,6 +100,7 @@ impl Optimize {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        self.of_one_kind()?;
         if !self.array.shapes.is_empty() {
             let shared = Shared {
                 design: &self.design,
@@ -169,6 +165,35 @@ impl Optimize {
         accuracy_check(missed.as_slice())
     }
 
+    /// Refuses arguments of one coil beside `--for`, and those of shapes without it. No clap rule says that the former
+    /// exclude `--for`: clap drops what an argument requires where another excludes that.
+    fn of_one_kind(&self) -> Result<(), Failure> {
+        let of_shapes = self.array.surface.given();
+        if self.array.shapes.is_empty() && !of_shapes.is_empty() {
+            return Err(Failure::Usage(format!(
+                "{} can only be used with --for: one coil is optimised without shapes",
+                of_shapes.join(", ")
+            )));
+        }
+        let of_one_coil = [
+            (self.wound, "--wound"),
+            (self.neighbours, "--neighbours"),
+            (!self.fix.is_empty(), "--fix"),
+            (self.certificate_cells.is_some(), "--certificate-cells"),
+        ];
+        let given: Vec<&str> = of_one_coil
+            .into_iter()
+            .filter_map(|(given, name)| given.then_some(name))
+            .collect();
+        if self.array.shapes.is_empty() || given.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "{} cannot be used with --for, which searches a whole array and not one coil",
+            given.join(", ")
+        )))
+    }
+
     /// Writes every file of the result, and the summary.
     fn write(
         &self,
@@ -196,13 +221,14 @@ impl Optimize {
     }
 
     fn request(&self) -> OptimizeRequest {
+        let default = OptimizeRequest::default();
         OptimizeRequest {
             wound: self.wound,
             neighbours: self.neighbours,
             fixed: self.fix.clone(),
-            starts: self.starts.unwrap_or(OptimizeRequest::default().starts),
+            starts: self.starts.unwrap_or(default.starts),
             seed: self.seed,
-            cells: self.certificate_cells,
+            cells: self.certificate_cells.unwrap_or(default.cells),
             around: true,
             landscape: self.array.plot.is_some(),
             tolerance: self.tolerance.tolerance,

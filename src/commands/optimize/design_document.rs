@@ -240,6 +240,9 @@ mod tests {
             assert!(m_from_mm(most) <= limit_m && limit_m <= m_from_mm(least));
             assert!((least / most - 1.0).abs() < 1e-14, "{least} {most}");
         }
-        assert_eq!([38.0, 0.7].map(|size| at_most_mm(m_from_mm(size))), [38.0, 0.7]);
+        assert_eq!(
+            [38.0, 0.7].map(|size| at_most_mm(m_from_mm(size))),
+            [38.0, 0.7]
+        );
     }
 }

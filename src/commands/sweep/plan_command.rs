@@ -61,7 +61,7 @@ pub struct Plan {
     #[arg(long, requires = "optimize")]
     wound: bool,
     /// Search the array that renders these shapes best, as `optimize --for` does
-    #[arg(long = "for", value_name = "SHAPE", num_args = 1.., conflicts_with = "optimize")]
+    #[arg(long = "for", value_name = "SHAPE", num_args = 1..)]
     shapes: Vec<PathBuf>,
     /// With --for: most arrays that the search of each design computes
     #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations as u32,
@@ -99,6 +99,12 @@ impl Plan {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        // As a rule of clap it would drop what --wound and --evaluations require.
+        if self.optimize && !self.shapes.is_empty() {
+            let both =
+                "--optimize cannot be used with --for: one finds a coil, the other a whole array";
+            return Err(Failure::Usage(both.to_owned()));
+        }
         let array = (!self.shapes.is_empty()).then(|| ArrayTask {
             shapes: self
                 .shapes
