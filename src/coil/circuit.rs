@@ -54,7 +54,7 @@ impl From<&Coil> for CoilSize {
 }
 
 /// A coil as its driver sees it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Circuit {
     /// Number of turns N.
     pub turns: f64,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::iron::middle;
+use super::rated::Rated;
 use super::single::above_knee;
 use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
@@ -149,8 +150,23 @@ pub struct ArrayCoil {
     pub current_max_a: f64,
 }
 
+/// The array of `rated`, whose limits are checked with its inductances; `None` for a single coil without other
+/// steel.
+///
+/// # Errors
+/// Steel that cannot be solved.
+pub(crate) fn of_rated(scene: &Scene, rated: &mut Rated) -> Result<Option<ArraySummary>, RunError> {
+    let array = array(scene, &mut rated.accuracy, &mut rated.warnings)?;
+    if let Some(array) = &array {
+        rated.check_limits(scene, Some(&array.mutual_inductance_h));
+        let missed = array.accuracy_missed.iter().cloned();
+        rated.accuracy_missed.extend(missed);
+    }
+    Ok(array)
+}
+
 /// The array among its neighbours and other steel; `None` for a single coil without either.
-pub(crate) fn array(
+fn array(
     scene: &Scene,
     accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
     warnings: &mut Vec<String>,

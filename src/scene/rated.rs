@@ -13,6 +13,7 @@ use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck, UsedPower};
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
+use crate::design::Supply;
 
 /// One coil alone at its rated current, SI.
 pub(crate) struct Rated {
@@ -69,6 +70,18 @@ pub struct CircuitSummary {
     pub mass_kg: f64,
     /// Heat at the rated current, W.
     pub power_w: f64,
+}
+
+impl CircuitSummary {
+    /// Time until a step to `current_a` has settled, s: [`Circuit::settling_under_s`].
+    pub(crate) fn settling_under_s(&self, supply: &Supply, current_a: f64) -> f64 {
+        let circuit = Circuit {
+            resistance_ohm: self.resistance_ohm,
+            inductance_h: self.inductance_h,
+            ..Circuit::default()
+        };
+        circuit.settling_under_s(supply, current_a)
+    }
 }
 
 impl Rated {

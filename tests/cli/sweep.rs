@@ -144,6 +144,47 @@ fn a_row_is_what_evaluate_says() {
     assert_eq!(row["limits_met"], met);
 }
 
+/// A sweep looked at the coil alone: a limit on the array's settling was no limit, and a current loop's coil took five
+/// time constants.
+#[test]
+fn a_row_has_the_limits_and_the_settling_time_of_evaluate() {
+    let place = Place::new();
+    let limited = |most_ms: f64, driver: &str| {
+        let limits = format!("[limits]\narray_settling_max_ms = {most_ms}\n");
+        let supply = format!("[supply]\ndriver = \"{driver}\"\n");
+        let text = place.text(SEED).replace("[limits]", &limits);
+        let text = text.replace("[supply]", &supply);
+        text.replace("turns = 1429", "turns = 1400")
+    };
+    for (driver, limits) in [("voltage", [9.0, 40.0]), ("current", [1.0, 40.0])] {
+        let mut met = Vec::new();
+        for most_ms in limits {
+            place.write("design.toml", &limited(most_ms, driver));
+            let set = ["--set", "limits.resistance_max_ohm=9"];
+            let plan = ["sweep", "plan", "design.toml", "--force"];
+            place.run(&[&plan[..], &set].concat()).ends(0);
+            let run = ["sweep", "run", "plan.json", "--out", "p", "--force"];
+            place.run(&run).ends(0);
+            place.write(
+                "one.toml",
+                &place
+                    .text("design.toml")
+                    .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 9"),
+            );
+            let reported = place.run(&["evaluate", "one.toml", "--format", "json"]);
+            let reported = reported.ends(0).json();
+            let limits = &reported["limits"];
+            let all = limits.as_object().unwrap().values();
+            let all_met = all.fold(true, |all, limit| all && limit["met"] == true);
+            let row: Value = serde_json::from_slice(&place.read(&point("p", 0))).unwrap();
+            assert_eq!(row["row"]["limits_met"], all_met, "{most_ms} {limits}");
+            assert_eq!(row["row"]["settling_s"], limits["settling_s"]["value"]);
+            met.push(limits["array_settling_s"]["met"].as_bool().unwrap());
+        }
+        assert_eq!(met, [false, true], "{driver}");
+    }
+}
+
 fn spawn(place: &Place, args: &[&str]) -> Child {
     let mut command = place.command(args);
     command.stdout(Stdio::null()).stderr(Stdio::null());

@@ -59,7 +59,7 @@ pub struct Row {
     pub resistance_ohm: f64,
     /// Self inductance; with a B-H curve the flux linkage over the current.
     pub inductance_h: f64,
-    /// Five time constants.
+    /// Five time constants; under a current loop the time until a step to the rated current has settled.
     pub settling_s: f64,
     /// Heat.
     pub power_w: f64,
@@ -93,7 +93,7 @@ pub struct Row {
 pub struct IronRow {
     /// Largest self inductance.
     pub inductance_h: f64,
-    /// Five time constants of the slowest pattern of currents.
+    /// Five time constants of the slowest pattern of currents, or a current loop's time for it.
     pub settling_s: f64,
     /// Largest |B| in the plate and other bodies with all coils at their rated currents.
     pub peak_field_t: f64,

@@ -115,12 +115,7 @@ pub fn evaluate(
         iron.check_target(design)?;
     }
     let mut rated = Rated::new(&scene)?;
-    let array = neighbours::array(&scene, &mut rated.accuracy, &mut rated.warnings)?;
-    if let Some(array) = &array {
-        rated.check_limits(&scene, Some(&array.mutual_inductance_h));
-    }
-    let of_array = array.iter().flat_map(|array| &array.accuracy_missed);
-    rated.accuracy_missed.extend(of_array.cloned());
+    let array = neighbours::of_rated(&scene, &mut rated)?;
     let transient = transient(&scene, &mut rated);
     Ok(Evaluation {
         schema_version: SCHEMA_VERSION,

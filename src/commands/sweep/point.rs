@@ -17,10 +17,10 @@ use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::numerics::mixed_search::Settings;
 use crate::progress::{Interrupted, Silent, poll};
-use crate::scene::Scene;
 use crate::scene::cost::{Cost, OfDesigns, of_designs};
 use crate::scene::rated::{CircuitSummary, Rated};
 use crate::scene::sources::ShapeSource;
+use crate::scene::{Scene, neighbours};
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
@@ -115,7 +115,8 @@ impl<'a> Sweep<'a> {
                     tolerance: self.plan.tolerance,
                     ..OptimizeRequest::default()
                 };
-                optimize(&document, Vec::new(), &request, &Silent).map(|result| optimum(&result))
+                optimize(&document, Vec::new(), &request, &Silent)
+                    .map(|result| optimum(&design, &result))
             }
             Mode::OptimizeFor => self.array(design, text, index),
         };
@@ -195,7 +196,7 @@ enum Computed {
     NoCoil(Status, String),
 }
 
-fn optimum(result: &Optimization) -> Computed {
+fn optimum(design: &Design, result: &Optimization) -> Computed {
     let (Some(coil), Some(objective)) = (&result.coil, &result.objective) else {
         let status = match result.status {
             Ending::Unbounded => Status::Unbounded,
@@ -220,7 +221,7 @@ fn optimum(result: &Optimization) -> Computed {
             certificate: result.certificate.kind,
             upper_bound_n: result.certificate.upper_bound_n,
         }),
-        ..row(coil.turns, &coil.circuit)
+        ..row(design, coil.turns, &coil.circuit, objective.current_a)
     };
     Computed::Row(Box::new(row), status(result.accuracy_reached))
 }
@@ -229,14 +230,23 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunErr
     if design.has_iron() {
         return among_steel(design, tolerance);
     }
-    let rated = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
+    let scene = Scene::with_tolerance(design, tolerance)?;
+    let mut rated = Rated::new(&scene)?;
+    if design.limits.array_settling_max_s.is_some() {
+        neighbours::of_rated(&scene, &mut rated)?;
+    }
     let row = Row {
         current_a: rated.target.current_a,
         gradient_t_per_m_per_a: rated.target.gradient_t_per_m_per_a,
         force_n: rated.target.force_n,
         core_peak_field_t: rated.core.as_ref().map(|core| core.peak_field_t),
         limits_met: rated.limits.values().all(|check| check.met),
-        ..row(rated.coil.turns, &rated.coil.circuit)
+        ..row(
+            design,
+            rated.coil.turns,
+            &rated.coil.circuit,
+            rated.target.current_a,
+        )
     };
     Ok(Computed::Row(
         Box::new(row),
@@ -247,22 +257,32 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunErr
 /// A coil alone, and what `evaluate` has of the array with its plate and other steel.
 fn among_steel(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
     let evaluation = evaluate(design, Vec::new(), tolerance)?;
+    let current_a = evaluation.target.current_a;
     let iron = evaluation.array.as_ref().and_then(|array| {
+        let slowest = CircuitSummary {
+            inductance_h: array.slowest_inductance_h,
+            ..evaluation.coil.circuit
+        };
         let own = array.coils.iter().map(|coil| coil.inductance_h);
         Some(IronRow {
             inductance_h: own.fold(0.0, f64::max),
-            settling_s: array.settling_s,
+            settling_s: slowest.settling_under_s(&design.supply, current_a),
             peak_field_t: array.iron.as_ref()?.peak_field_t,
         })
     });
     let row = Row {
-        current_a: evaluation.target.current_a,
+        current_a,
         gradient_t_per_m_per_a: evaluation.target.gradient_t_per_m_per_a,
         force_n: evaluation.target.force_n,
         core_peak_field_t: evaluation.core.as_ref().map(|core| core.peak_field_t),
         limits_met: evaluation.limits_met(),
         iron,
-        ..row(evaluation.coil.turns, &evaluation.coil.circuit)
+        ..row(
+            design,
+            evaluation.coil.turns,
+            &evaluation.coil.circuit,
+            current_a,
+        )
     };
     Ok(Computed::Row(
         Box::new(row),
@@ -270,13 +290,13 @@ fn among_steel(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunE
     ))
 }
 
-/// A row of the coil alone.
-fn row(turns: f64, circuit: &CircuitSummary) -> Row {
+/// A row of the coil alone; its settling time is that of its limit, a current loop's where there is one.
+fn row(design: &Design, turns: f64, circuit: &CircuitSummary, current_a: f64) -> Row {
     Row {
         turns,
         resistance_ohm: circuit.resistance_ohm,
         inductance_h: circuit.inductance_h,
-        settling_s: circuit.settling_s,
+        settling_s: circuit.settling_under_s(&design.supply, current_a),
         power_w: circuit.power_w,
         mass_kg: circuit.mass_kg,
         wire_length_m: circuit.wire_length_m,
