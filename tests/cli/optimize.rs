@@ -542,6 +542,32 @@ fn neighbours_cores_change_the_best_force() {
     assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-3));
 }
 
+/// Among neighbours a current loop's coil was said to take five time constants.
+#[test]
+fn a_current_loop_settles_as_fast_among_neighbours() {
+    let place = Place::new();
+    let text = place
+        .text("designs/seed.toml")
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2")
+        .replace("[supply]", "[supply]\ndriver = \"current\"");
+    place.write("pair.toml", &text);
+    let args = ["optimize", "pair.toml", "--neighbours", "--starts", "2"];
+    let found = place.run(&[&args[..], &["--out", "best.toml", "--format", "json"]].concat());
+    let among_s = number(&found.ends(0).json(), "limits/settling_s/value");
+    let best = place.run(&["evaluate", "best.toml", "--format", "json"]);
+    let best = best.ends(0).json();
+    let alone_s = number(&best, "limits/settling_s/value");
+    let loops = number(&best, "coil/settling_s") / alone_s;
+    assert!(loops > 2.0, "{loops}");
+    let own_h = number(&best["array"]["coils"][0], "inductance_h");
+    near(
+        among_s / alone_s,
+        own_h / number(&best, "coil/inductance_h"),
+        0.05,
+    );
+}
+
 /// Whole turns around a core were `exhaustive` in JSON, nothing proven on screen, `multistart` in
 /// a sweep.
 #[test]

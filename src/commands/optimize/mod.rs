@@ -289,7 +289,8 @@ impl Optimization {
             return Ok(());
         };
         // The gain is a correction of a built coil's map.
-        let force_n = per_ampere[coil] / scene.coils[coil].gain * objective.current_a;
+        let current_a = objective.current_a;
+        let force_n = per_ampere[coil] / scene.coils[coil].gain * current_a;
         objective.alone_force_n = Some(objective.force_n);
         objective.force_n = force_n;
         let off = self.agreement(best.force_n, force_n, "a coupled solution");
@@ -307,7 +308,7 @@ impl Optimization {
                 inductance_h: scene.circuit.inductance_h + added_h,
                 ..scene.circuit
             };
-            used.value = circuit.settling_s();
+            used.value = circuit.settling_under_s(&design.supply, current_a);
             used.met = used.value <= used.limit * (1.0 + NEIGHBOURS_AGREE);
         }
         Ok(())
