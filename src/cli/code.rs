@@ -29,7 +29,7 @@ pub enum Code {
     NotABundle,
     /// A scan that does not determine what is to be fitted, or is in other units.
     Scan,
-    /// Limits that are not met, with `--strict`.
+    /// Limits that are not met: `evaluate --strict`, `optimize`.
     Limits,
     /// The chosen lambda is null.
     NoForceConstant,
@@ -116,7 +116,7 @@ impl Code {
                 Some(Input),
                 "a scan that does not determine the fit, or is in other units",
             ),
-            Self::Limits => ("E401", Some(Unmet), "limits that are not met (--strict)"),
+            Self::Limits => ("E401", Some(Unmet), "limits that are not met"),
             Self::NoForceConstant => ("E402", Some(Unmet), "the chosen lambda is null"),
             Self::Accuracy => (
                 "E403",

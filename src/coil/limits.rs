@@ -111,6 +111,10 @@ pub enum CoilQuantity {
     Voltage,
     /// The rated current, A.
     Current,
+    /// Heat of all coils of the array, W.
+    ArrayPower,
+    /// Mass of all coils and cores of the array, kg.
+    ArrayMass,
 }
 
 /// A unit and how many of it are one SI unit.
@@ -136,7 +140,7 @@ pub struct Limit {
     pub direction: Direction,
     /// Whether it alone gives the force a maximum.
     pub ends_growth: bool,
-    /// What it bounds of one coil; `None` where it is one of the whole array.
+    /// What it bounds of one coil, or of an array of such coils; `None` where more than the coil decides.
     pub quantity: Option<CoilQuantity>,
     /// Whether its value follows from shapes, not from a design alone.
     pub of_shapes: bool,
@@ -286,7 +290,7 @@ const HEAT_OF_ALL: Limit = Limit {
     unit: "W",
     written: ("W", 1.0),
     step: ("W", 1.0),
-    quantity: None,
+    quantity: Some(CoilQuantity::ArrayPower),
     of: |limits| limits.array_power_max_w,
     value: |at| Some(at.array_power_w()),
     ..SIZE
@@ -422,6 +426,7 @@ pub static LIMITS: &[Limit] = &[
         key: "static_power_w",
         design_key: "limits.static_power_max_w",
         label: "heat at static currents",
+        quantity: None,
         of_shapes: true,
         of: |limits| limits.static_power_max_w,
         value: |at| at.used.static_w,
@@ -432,6 +437,7 @@ pub static LIMITS: &[Limit] = &[
         key: "feedback_power_w",
         design_key: "limits.feedback_power_max_w",
         label: "heat with feedback",
+        quantity: None,
         of_shapes: true,
         of: |limits| limits.feedback_power_max_w,
         value: |at| at.used.feedback_w,
@@ -445,7 +451,7 @@ pub static LIMITS: &[Limit] = &[
         unit: "g",
         written: ("kg", 1.0),
         step: ("kg", 1.0),
-        quantity: None,
+        quantity: Some(CoilQuantity::ArrayMass),
         of: |limits| limits.array_mass_max_kg,
         value: |at| Some(at.array_mass_kg()),
         ..SIZE

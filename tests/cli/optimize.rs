@@ -568,6 +568,93 @@ fn a_current_loop_settles_as_fast_among_neighbours() {
     );
 }
 
+/// The time of a current loop, and heat and mass of all coils, were stated as not met beside a best coil.
+#[test]
+fn limits_of_current_loops_and_of_all_coils_are_kept() {
+    let place = Place::new();
+    let text = place.text(SEED);
+    let set = |key: &str, value: f64| {
+        let limit = format!("[limits]\n{key} = {value:?}\n");
+        place.write("limited.toml", &text.replace("[limits]", &limit));
+    };
+    let best = |more: &[&str]| {
+        let args = [
+            "optimize",
+            "limited.toml",
+            "--starts",
+            "7",
+            "--format",
+            "json",
+        ];
+        let args = [&args[..], &["--out", "best.toml", "--force"], more].concat();
+        place.run(&args).ends(0).json()
+    };
+    let strict = || {
+        place.run(&["evaluate", "best.toml", "--strict"]).ends(0);
+    };
+    for (key, limit, name) in [
+        ("array_power_max_w", 10.0, "array_power_w"),
+        ("array_mass_max_kg", 1.3, "array_mass_kg"),
+    ] {
+        set(key, limit);
+        best(&["--wound"]);
+        strict();
+        let found = best(&[]);
+        strict();
+        assert_eq!(found["limits"][name]["active"], true, "{found}");
+        assert_eq!(found["certificate"]["kind"], "global");
+        let force = |by: f64| {
+            set(key, limit * by);
+            number(&best(&[]), "objective/force_n")
+        };
+        let worth = (force(1.001) - force(0.999)) / (0.002 * limit);
+        near(
+            number(&found["limits"][name], "sensitivity_n_per_unit"),
+            worth,
+            1e-3,
+        );
+    }
+    let looped = text
+        .replace("[supply]", "[supply]\ndriver = \"current\"")
+        .replace("voltage_v = 36.0", "voltage_v = 14.0")
+        .replace("settling_max_ms = 100.0", "settling_max_ms = 5.0");
+    place.write("limited.toml", &looped);
+    let found = best(&[]);
+    strict();
+    let settling = &found["limits"]["settling_s"];
+    assert_eq!(settling["active"], true, "{found}");
+    near(number(settling, "value"), 0.005, 1e-9);
+    let force_n = number(&found, "objective/force_n");
+    assert!(number(&found, "certificate/upper_bound_n") >= force_n);
+    let wound = best(&["--wound"]);
+    strict();
+    let wound_n = number(&wound, "objective/force_n");
+    assert!(wound_n <= force_n && wound_n > 0.9 * force_n, "{wound}");
+}
+
+/// Limits of the whole array were missed by a coil that was proven best with exit code 0, or not looked at.
+#[test]
+fn limits_that_the_search_of_one_coil_leaves_out_are_named() {
+    let place = Place::new();
+    let text = place.text(SEED);
+    for (key, value, code) in [
+        ("footprint_max_mm", 120.0, 4),
+        ("array_settling_max_ms", 1.0, 4),
+        ("static_power_max_w", 0.1, 0),
+        ("footprint_max_mm", 150.0, 0),
+    ] {
+        let limit = format!("[limits]\n{key} = {value:?}\n");
+        place.write("limited.toml", &text.replace("[limits]", &limit));
+        let args = ["optimize", "limited.toml", "--starts", "3"];
+        let ran = place.run(&args).ends(code);
+        let left_out = format!("no coil within the limits other than limits.{key} gives more");
+        let is_left_out = value < 150.0;
+        assert_eq!(ran.out.contains(&left_out), is_left_out, "{}", ran.out);
+        assert_eq!(ran.err.contains(key), is_left_out, "{}", ran.err);
+        assert_eq!(ran.out.contains("NOT met"), code == 4, "{}", ran.out);
+    }
+}
+
 /// Whole turns around a core were `exhaustive` in JSON, nothing proven on screen, `multistart` in
 /// a sweep.
 #[test]

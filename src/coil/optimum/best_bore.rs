@@ -126,9 +126,13 @@ impl<'a> Bores<'a> {
         let [lo, at, hi] = bores;
         // The others are kept between `lo` and `hi`, and touched there or, with one layer or turn,
         // throughout: a root of theirs is not looked for.
-        let of_the_model = |name| {
-            let names = [LimitName::Settling, LimitName::CoreField, LimitName::Mass];
-            names.contains(&name)
+        let of_the_model = |name| match name {
+            LimitName::Settling | LimitName::CoreField | LimitName::Mass | LimitName::ArrayMass => {
+                true
+            }
+            // Of drivers alone it follows from the amount of wire.
+            LimitName::ArrayPower => self.problem.regime == Regime::Supply,
+            _ => false,
         };
         let over = |a: f64| self.worst(window(a), of_the_model);
         let ln_force = |a: f64| self.ln_force(window(a));

@@ -15,8 +15,9 @@ use fluxform_base::progress::poll;
 use fluxform_numerics::interval::Interval;
 
 const USED: f64 = 0.9;
-/// Most boxes of one coil's bore.
+/// Most boxes of one coil's bore, and of one that a current loop's time holds back, for which there is no bound.
 const BORES: usize = 20_000;
+const UNBOUNDED_BORES: usize = 100;
 
 /// A box of coils.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +67,8 @@ impl LatticeBox {
 pub(super) struct BoundedCoils<'a> {
     bores: Bores<'a>,
     bounding: Bounding<'a>,
+    /// Whether the settling time holds the continuous optimum back.
+    with_settling: bool,
     best_ln: f64,
 }
 
@@ -83,6 +86,7 @@ impl<'a> BoundedCoils<'a> {
         Some(Self {
             bounding: Bounding::new(problem, domain, multipliers, with_settling)?,
             bores: Bores::of(problem),
+            with_settling,
             best_ln,
         })
     }
@@ -123,6 +127,8 @@ impl<'a> BoundedCoils<'a> {
     /// Proves that no bore of one coil exceeds `value` by more than the gap.
     fn bound_bores(&self, cell: Cell, value: f64, parts: &mut Parts<LatticeBox>) {
         let enough = value + USED * GAP;
+        let unbounded = self.with_settling && self.bores.problem.closes_a_loop();
+        let most = if unbounded { UNBOUNDED_BORES } else { BORES };
         let mut stack = vec![cell];
         let mut count = 0;
         while let Some(cell) = stack.pop() {
@@ -137,7 +143,7 @@ impl<'a> BoundedCoils<'a> {
             };
             let middle = 0.5 * (cell.inner.lo + cell.inner.hi);
             let cut = middle > cell.inner.lo && middle < cell.inner.hi;
-            if bound <= enough || !cut || count > BORES {
+            if bound <= enough || !cut || count > most {
                 parts.bound_ln = parts.bound_ln.max(bound);
                 continue;
             }

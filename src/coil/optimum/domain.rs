@@ -20,7 +20,8 @@ pub struct Domain {
     pub length_m: [f64; 2],
     /// (a2^2 - a1^2) L, m^3: what limits of resistance, heat, mass and wire come to.
     pub volume_m3: [f64; 2],
-    /// Five L/R, s.
+    /// Five L/R, s; infinite where drivers close current loops, whose times are not bounded
+    /// over boxes.
     pub settling_max_s: f64,
 }
 
@@ -34,6 +35,9 @@ pub struct Contradiction {
     /// In words.
     pub message: String,
 }
+
+/// A resistance, ohm, that leaves every coil its driver's current.
+const UNLIMITED_OHM: f64 = 1e-9;
 
 /// Slack of a comparison of two limits.
 const TOUCHING: f64 = 1e-12;
@@ -54,8 +58,18 @@ impl Domain {
                     bound.limit / problem.task.current_max_a / problem.task.current_max_a
                 }
                 (LimitName::Voltage, _) => bound.limit / problem.task.current_max_a,
+                (LimitName::ArrayPower, Regime::Driver) => {
+                    // Drivers that set the strongest one's current set all others'.
+                    let [heat_w, _] = problem.task.array_heat_w(UNLIMITED_OHM);
+                    bound.limit / (heat_w / UNLIMITED_OHM)
+                }
                 (LimitName::Mass, _) => {
                     most = most.min(bound.limit / problem.strand.mass_per_volume());
+                    continue;
+                }
+                (LimitName::ArrayMass, _) => {
+                    let mass_kg = bound.limit / problem.task.array_a.len() as f64;
+                    most = most.min(mass_kg / problem.strand.mass_per_volume());
                     continue;
                 }
                 (LimitName::WireLength, _) => {
@@ -101,7 +115,9 @@ impl Domain {
             depth_min_m: wire_m,
             length_m,
             volume_m3: [least, most],
-            settling_max_s: limit(LimitName::Settling).unwrap_or(f64::INFINITY),
+            settling_max_s: limit(LimitName::Settling)
+                .filter(|_| !problem.closes_a_loop())
+                .unwrap_or(f64::INFINITY),
         }
     }
 

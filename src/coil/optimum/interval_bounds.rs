@@ -62,9 +62,11 @@ impl Multipliers {
                     | LimitName::Power
                     | LimitName::Voltage
                     | LimitName::Mass
+                    | LimitName::ArrayMass
                     | LimitName::WireLength,
                     _,
-                ) => sums.most += lambda.max(0.0),
+                )
+                | (LimitName::ArrayPower, Regime::Driver) => sums.most += lambda.max(0.0),
                 (LimitName::OuterDiameter | LimitName::Pitch, _) => sums.outer += lambda.max(0.0),
                 (LimitName::FixedOuter, _) => sums.outer += lambda,
                 (LimitName::Settling, _) => sums.settling += lambda.max(0.0),

@@ -44,6 +44,7 @@ pub mod interval_bounds;
 pub mod landscape;
 pub mod lazy_table;
 mod local_searches;
+mod loop_settling;
 pub mod model;
 pub mod near_optimal_bore;
 pub mod neighbours;

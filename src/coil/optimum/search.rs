@@ -351,6 +351,10 @@ fn bound(
             Multipliers::of(&solved.problem, &local.multipliers)
         });
     let limited = domain.settling_max_s.is_finite();
+    let problem = &solved.problem;
+    let held_by_a_loop = problem.closes_a_loop()
+        && problem.limit_of(LimitName::Settling).is_some()
+        && (multipliers.settling > 0.0 || solved.best.is_none());
     let rounds: &[bool] = match (limited, multipliers.settling > 0.0) {
         (false, _) => &[false],
         (true, false) => &[false, true],
@@ -365,6 +369,8 @@ fn bound(
         // A relaxation that does not close is soon given up.
         // and the inductance costs as much as many cells.
         let budget = match (limited, with_settling) {
+            // Of a current loop's time there is no bound: where it holds the coil back the relaxation need not close.
+            (false, _) if held_by_a_loop => settings.cells / 128,
             (false, _) => settings.cells,
             (true, false) => settings.cells / 16,
             (true, true) => settings.cells / 32,

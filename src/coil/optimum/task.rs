@@ -49,19 +49,23 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     {
         return Err(NoTask::NoVoltage);
     }
-    let mut limits = design.limits;
-    match design.supply.driver {
-        Driver::Voltage => {}
-        // A loop is faster than five time constants; `evaluate` checks what it reaches.
-        Driver::Current => limits.settling_max_s = None,
-    }
+    let supply = &design.supply;
+    let ends = currents.iter().zip(&supply.current_min_a);
+    let mut array_a: Vec<f64> = ends.map(|(up, down)| up.max(-down)).collect();
+    array_a.sort_by(|a, b| b.total_cmp(a));
     Ok(Task {
-        limits,
+        limits: design.limits,
         fixed,
         pitch_m: nearest_m(&design.array.positions_m),
         bobbin: false,
         current_max_a,
-        voltage_v: design.supply.voltage_v,
+        voltage_v: supply.voltage_v,
+        bandwidth_hz: match supply.driver {
+            Driver::Voltage => None,
+            Driver::Current => Some(supply.bandwidth_hz),
+        },
+        array_a,
+        total_current_max_a: supply.total_current_max_a,
         strands: Strand::choices(&design.wire),
     })
 }

@@ -45,6 +45,9 @@ pub(super) fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
         bobbin: false,
         current_max_a: 2.0,
         voltage_v,
+        bandwidth_hz: None,
+        array_a: vec![2.0],
+        total_current_max_a: None,
         strands: Strand::choices(&wire(0.0007)),
     }
 }

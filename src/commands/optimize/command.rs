@@ -160,6 +160,11 @@ impl Optimize {
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }
+        let missed = result.missed();
+        if !missed.is_empty() {
+            let message = format!("the best coil misses {}", missed.join(", "));
+            return Err(Failure::Unmet(Wish::Limits, message));
+        }
         let missed =
             (!result.accuracy_reached).then(|| "the best coil: see its accuracy".to_owned());
         accuracy_check(missed.as_slice())

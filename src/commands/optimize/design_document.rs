@@ -12,6 +12,7 @@ use crate::coil::optimum::{BestCoil, Fixed};
 use crate::design::template::Template;
 use crate::design::{Design, Need, Severity};
 use crate::scene::Scene;
+use crate::scene::neighbours::of_rated;
 use crate::scene::rated::Rated;
 use crate::units::m_from_mm;
 
@@ -140,9 +141,15 @@ pub(super) fn write(
     let mut attempt = 0;
     loop {
         let written = text_of(document, best, &sizes)?;
-        let rated = rated(&written.design, tolerance)?;
+        let mut rated = rated(&written.design, tolerance)?;
         let over = excess(&rated, best.regime);
         if over == 0.0 || over.abs() > ROUNDING || attempt == ATTEMPTS {
+            if document.design.limits.array_settling_max_s.is_some() {
+                of_rated(
+                    &Scene::with_tolerance(&written.design, tolerance)?,
+                    &mut rated,
+                )?;
+            }
             return Ok((written, rated));
         }
         // The limits' own slopes are of order one.
@@ -163,7 +170,8 @@ fn excess(rated: &Rated, regime: Regime) -> f64 {
         };
         let over = value / limit - 1.0;
         // At a given voltage heat falls with the resistance.
-        let lacking = row.name == LimitName::Power && regime == Regime::Supply;
+        let heat = matches!(row.name, LimitName::Power | LimitName::ArrayPower);
+        let lacking = heat && regime == Regime::Supply;
         let over = if lacking { -over } else { over };
         if f64::abs(over) > f64::abs(most) {
             most = over;

@@ -22,7 +22,9 @@ use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::circuit::Circuit;
-use crate::coil::limits::{LimitCheck, LimitName, bobbin_bore_m as bobbin_bore_m_of, by_key};
+use crate::coil::limits::{
+    LIMITS, LimitCheck, LimitName, bobbin_bore_m as bobbin_bore_m_of, by_key,
+};
 use crate::coil::optimum::alternatives::alternatives;
 use crate::coil::optimum::landscape::{CoilLandscape, landscape};
 use crate::coil::optimum::neighbours::Neighbours;
@@ -32,7 +34,7 @@ use crate::coil::optimum::{
     Advantage, Alternative, BestCoil, Fixed, LimitUse, Outcome, Settings, Window, optimise,
     optimise_wound,
 };
-use crate::design::Design;
+use crate::design::{Design, Limits};
 use crate::progress::{Progress, Silent};
 use crate::scene::rated::Rated;
 use crate::scene::steel;
@@ -145,6 +147,7 @@ pub fn optimize(
         coil: None,
         objective: None,
         limits: BTreeMap::new(),
+        limits_left_out: Vec::new(),
         bounds: BTreeMap::new(),
         certificate: outcome.certificate,
         evaluations: outcome.evaluations,
@@ -171,6 +174,7 @@ pub fn optimize(
         if surroundings(design, request.neighbours) == Surroundings::Neighbours {
             result.among_neighbours(&written.design, best, request.tolerance)?;
         }
+        result.leave_out(&design.limits);
         result.picture = landscape.map(|around| picture::picture(&around, best, &written.design));
         result.design_text = Some(written.text);
     }
@@ -220,6 +224,39 @@ impl Optimization {
         self.accuracy = rated.accuracy;
         self.agreement(best.force_n, force_n, "evaluate's");
         self.warnings = rated.warnings;
+    }
+
+    /// Names those of `limits` on more than the coil that the best one misses, or that follow from shapes.
+    fn leave_out(&mut self, limits: &Limits) {
+        let of_more = LIMITS.iter().filter(|row| row.quantity.is_none());
+        for row in of_more.filter(|row| (row.of)(limits).is_some()) {
+            let key = row.design_key;
+            match self.limits.get(row.key) {
+                Some(used) if used.met => continue,
+                Some(_) => self.warnings.push(format!(
+                    "{key} is missed: the search of one coil leaves it out; set a tighter limit of the coil, or search the \
+                     whole array with `optimize --for SHAPE`"
+                )),
+                None => self.warnings.push(format!(
+                    "{key} is not checked: it depends on shapes; `optimize --for SHAPE` keeps it"
+                )),
+            }
+            self.limits_left_out.push(key);
+        }
+    }
+
+    /// The limits that hold for the certificate, in words.
+    fn within(&self) -> String {
+        match self.limits_left_out.as_slice() {
+            [] => "within the limits".to_owned(),
+            keys => format!("within the limits other than {}", keys.join(" and ")),
+        }
+    }
+
+    /// The keys of limits that the best coil misses.
+    fn missed(&self) -> Vec<&'static str> {
+        let missed = self.limits.values().filter(|used| !used.met);
+        missed.map(|used| used.name.limit().design_key).collect()
     }
 
     /// The design's limits as `evaluate` checks them and what else bounds the coil, with what each

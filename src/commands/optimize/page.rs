@@ -178,9 +178,10 @@ fn sure(result: &Optimization) -> Section {
     let kind = certificate.kind;
     let said = match (certificate.upper_bound_n, certificate.gap) {
         (Some(bound_n), Some(gap)) => format!(
-            "Certificate: {}. No coil within the limits gives more than {}, which is {} more \
+            "Certificate: {}. No coil {} gives more than {}, which is {} more \
              than this one.",
             kind.name(),
+            result.within(),
             force(bound_n),
             percent(gap)
         ),

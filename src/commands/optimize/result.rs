@@ -43,6 +43,10 @@ pub struct Optimization {
     pub objective: Option<Objective>,
     /// The design's limits by name.
     pub limits: BTreeMap<&'static str, LimitUse>,
+    /// Limits that the design sets, by their keys in it, that the search of one coil leaves out, unless the best coil meets
+    /// them all the same.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits_left_out: Vec<&'static str>,
     /// Other bounds of the coil: current and voltage, one layer, one turn.
     pub bounds: BTreeMap<&'static str, LimitUse>,
     /// How sure it is that no coil is better.

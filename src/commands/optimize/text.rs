@@ -209,12 +209,19 @@ fn certificate(result: &Optimization, objective: &Objective) -> String {
                 | CertificateKind::Exhaustive => (";", percent(gap)),
             };
             format!(
-                "{}{separator} no coil within the limits gives more than {}, {gap} above",
+                "{}{separator} no coil {} gives more than {}, {gap} above",
                 kind.scope(),
+                result.within(),
                 above(bound)
             )
         }
-        None => format!("{}; {}", kind.scope(), kind.open_question()),
+        None => {
+            let scope = match result.limits_left_out.as_slice() {
+                [] => kind.scope().to_owned(),
+                _ => format!("{} {}", kind.scope(), result.within()),
+            };
+            format!("{scope}; {}", kind.open_question())
+        }
     }
 }
 

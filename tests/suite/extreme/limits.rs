@@ -49,6 +49,9 @@ fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> 
         bobbin: false,
         current_max_a: 2.0,
         voltage_v: None,
+        bandwidth_hz: None,
+        array_a: vec![2.0],
+        total_current_max_a: None,
         strands: Strand::choices(&wire),
     };
     let settings = Settings {

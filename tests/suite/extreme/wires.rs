@@ -300,6 +300,9 @@ fn whole(d: f64) -> Outcome {
         bobbin: false,
         current_max_a: 2.0,
         voltage_v: None,
+        bandwidth_hz: None,
+        array_a: vec![2.0],
+        total_current_max_a: None,
         strands: Strand::choices(&wire(d)),
     };
     let outcome = optimise_wound(&model, &task, &Settings::default(), &Silent).map_err(reported)?;
