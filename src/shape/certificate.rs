@@ -186,7 +186,7 @@ pub fn certify(
         hausdorff: apart,
         tessellation_m,
         tessellation,
-        rounding_m: surface.coordinate_rounding_m(),
+        rounding_m: surface.height_rounding_m(),
         silhouette_m: grid.x_m.step().hypot(grid.y_m.step()),
     }))
 }

@@ -12,6 +12,8 @@ pub struct FileMesh {
     pub triangles: Vec<Triangle>,
     /// How far a coordinate may lie from what was meant, because of the file's number format.
     pub coordinate_rounding: f64,
+    /// The same of z where that is more: half a grey level of a height image; 0 elsewhere.
+    pub level_rounding: f64,
     /// Metres per unit of the coordinates, where the file itself says so.
     pub unit_m: Option<f64>,
     /// Estimate of how far the triangles may lie from the body they stand for, in the file's

@@ -78,7 +78,7 @@ pub struct Sample {
 #[must_use]
 pub fn reach_m(mesh: &Mesh, grid: &Grid) -> f64 {
     let facts = mesh.facts();
-    if facts.coordinate_rounding_m == 0.0 {
+    if facts.plan_rounding_m == 0.0 {
         return 0.0;
     }
     let plan = [facts.bounds.plan(), grid.plan()];
@@ -87,7 +87,7 @@ pub fn reach_m(mesh: &Mesh, grid: &Grid) -> f64 {
         .as_flattened()
         .iter()
         .fold(0.0, |m: f64, c| m.max(c.abs()));
-    REACH_ROUNDINGS * facts.coordinate_rounding_m + REACH_EPSILONS * f64::EPSILON * largest
+    REACH_ROUNDINGS * facts.plan_rounding_m + REACH_EPSILONS * f64::EPSILON * largest
 }
 
 /// The surface over every point of the grid, x fastest; `None` where there is none.

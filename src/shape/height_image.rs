@@ -85,8 +85,9 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     }
     Ok(FileMesh {
         triangles,
-        // Half a level; pixels are exact.
-        coordinate_rounding: 0.5 / LEVELS[usize::from(wide)],
+        // Pixels are exact, as far as doubles are; heights are known to half a level.
+        coordinate_rounding: f64::from(width.max(height)) * f64::EPSILON,
+        level_rounding: 0.5 / LEVELS[usize::from(wide)],
         warnings,
         ..FileMesh::default()
     })

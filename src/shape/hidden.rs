@@ -78,7 +78,7 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
     };
     let index = Index::new(mesh, rules.reach_m);
     let depth_m =
-        DEPTH * (bounds.max_m[2] - bounds.min_m[2]) + 2.0 * mesh.facts().coordinate_rounding_m;
+        DEPTH * (bounds.max_m[2] - bounds.min_m[2]) + 2.0 * mesh.facts().height_rounding_m;
     // Counts of points: all, hidden, facing up, of these hidden.
     let place = |k: usize| {
         let at = area * (k as f64 + 0.5) / POINTS as f64;

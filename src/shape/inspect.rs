@@ -187,7 +187,7 @@ impl MeshReport {
                 Some(_) => Vec::new(),
                 None => guesses.collect(),
             },
-            coordinate_rounding: file.coordinate_rounding,
+            coordinate_rounding: file.coordinate_rounding.max(file.level_rounding),
             deviation: file.deviation,
             watertight,
             open_edges: edges.open,

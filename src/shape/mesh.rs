@@ -18,8 +18,10 @@ pub struct MeshFacts {
     pub degenerate: usize,
     /// Box of the placed triangles that have an area.
     pub bounds: Bounds,
-    /// How far a coordinate may lie from what was meant, because of the file's number format, m.
-    pub coordinate_rounding_m: f64,
+    /// How far x and y may lie from what was meant, because of the file's number format, m.
+    pub plan_rounding_m: f64,
+    /// The same of z, m.
+    pub height_rounding_m: f64,
     /// Estimate of how far the triangles may lie from the body they stand for, m; 0 where the
     /// file states none.
     pub deviation_m: f64,
@@ -76,11 +78,14 @@ impl Mesh {
                 limit_m: FARTHEST_M,
             });
         }
+        let own = file.coordinate_rounding;
+        let [x_m, y_m, z_m] = transform.roundings_m([own, own, own.max(file.level_rounding)]);
         let facts = MeshFacts {
             triangles: count,
             degenerate: count - triangles.len(),
             bounds: Bounds { min_m, max_m },
-            coordinate_rounding_m: transform.length_m(file.coordinate_rounding),
+            plan_rounding_m: x_m.max(y_m),
+            height_rounding_m: z_m,
             deviation_m: transform.length_m(file.deviation),
             deviation_is_known: file.deviation_is_known,
         };

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::document::{Fit, Placement};
 use crate::file_mesh::{Bounds, Triangle};
+use fluxform_numerics::vec3::norm;
 
 /// Unit and placement as one map of points; right angles rotate exactly.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +106,20 @@ impl Transform {
     pub fn length_m(&self, length: f64) -> f64 {
         let [x, y, z] = self.scale;
         self.metres(length * x.max(y).max(z)) * self.growth
+    }
+
+    /// Roundings along the file's axes, m along those of the placed surface: apart, so that coarse
+    /// heights do not blur the plan. Where axes mix they add up by squares, as independent errors do.
+    #[must_use]
+    pub fn roundings_m(&self, roundings: [f64; 3]) -> [f64; 3] {
+        let own = [0, 1, 2].map(|k| self.metres(roundings[k] * self.scale[k]) * self.growth);
+        match &self.rotation {
+            Some(rotation) if own[0] != own[1] || own[1] != own[2] => [0, 1, 2].map(|i| {
+                let parts = [0, 1, 2].map(|k| rotation[(i, k)] * own[k]);
+                norm(parts)
+            }),
+            _ => own,
+        }
     }
 
     fn metres(&self, length: f64) -> f64 {
@@ -211,6 +226,20 @@ mod tests {
                 "{by_steps:?} {at_once:?}"
             );
         }
+    }
+
+    #[test]
+    fn roundings_follow_their_axes() {
+        let scaled = |rotate_deg| turned(rotate_deg).scaled([0.2, 0.3, 25.0]);
+        let own = [1e-9, 2e-9, 2e-3];
+        let flat = [1e-9 * 0.2, 2e-9 * 0.3, 2e-3 * 25.0];
+        assert_eq!(scaled([0.0; 3]).roundings_m(own), flat);
+        let [x, y, z] = flat;
+        assert_eq!(scaled([0.0, 90.0, 0.0]).roundings_m(own), [z, y, x]);
+        let [_, y, z] = scaled([30.0, 0.0, 0.0]).roundings_m(own);
+        assert!((y - 0.025).abs() < 1e-9 && (z - 0.05 * 0.75f64.sqrt()).abs() < 1e-9);
+        // Equal ones stay as they are, to the bit.
+        assert_eq!(turned([37.0, -23.0, 71.0]).roundings_m([0.7; 3]), [0.7; 3]);
     }
 
     #[test]

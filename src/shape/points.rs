@@ -274,7 +274,7 @@ pub fn discretize_surface(
     if !found.is_empty() {
         warnings.push(treat_holes(settings.holes, &grid, &mut samples, &found)?);
     }
-    let rounding_m = surface.coordinate_rounding_m();
+    let rounding_m = surface.height_rounding_m();
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
     let hidden = if settings.marks {

@@ -86,7 +86,7 @@ impl<'a> Probe<'a> {
                 let reach = reach_m(mesh, grid);
                 // Most files write a vertex the same way each time: the quick answer first.
                 let closed = point_flags::is_closed(mesh.triangles()) || {
-                    let rounding_m = mesh.facts().coordinate_rounding_m;
+                    let rounding_m = mesh.facts().plan_rounding_m;
                     let names = weld(mesh.triangles(), WELD_ROUNDINGS * rounding_m);
                     Edges::new(&names).closed()
                 };

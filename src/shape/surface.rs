@@ -118,11 +118,11 @@ impl Surface {
         }
     }
 
-    /// How far a coordinate of the surface may lie from what was meant, by its number format, m.
+    /// How far a height of the surface may lie from what was meant, by its number format, m.
     #[must_use]
-    pub fn coordinate_rounding_m(&self) -> f64 {
+    pub fn height_rounding_m(&self) -> f64 {
         match self {
-            Self::Mesh(mesh) => mesh.facts().coordinate_rounding_m,
+            Self::Mesh(mesh) => mesh.facts().height_rounding_m,
             Self::Primitive(primitive) => {
                 let Bounds { min_m, max_m } = primitive.bounds();
                 let largest = min_m

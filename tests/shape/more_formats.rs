@@ -5,7 +5,9 @@ use std::path::Path;
 
 use fluxform_base::progress::Silent;
 use fluxform_shape::bodies::BodyOptions;
-use fluxform_shape::document::SurfaceFormat;
+use fluxform_shape::document::{Placement, SurfaceFormat};
+use fluxform_shape::mesh::Mesh;
+use fluxform_shape::placement::Transform;
 use fluxform_shape::{MeshReport, ShapeError, surface};
 
 use crate::formats::{read, refusal};
@@ -13,7 +15,7 @@ use fluxform_testing::surface_files::{
     amf, glb, height_image, obj, off, ply_ascii, ply_strips, sldprt, step, three_dxml, three_mf,
     three_mf_model, three_mf_of,
 };
-use fluxform_testing::surfaces::binary;
+use fluxform_testing::surfaces::{binary, grid, sample};
 
 const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
 
@@ -126,6 +128,32 @@ fn a_height_image_is_a_surface_over_its_pixels() {
     for length in 0..bytes.len() - 12 {
         refusal(SurfaceFormat::HeightImage, &bytes[..length]);
     }
+}
+
+/// Half a grey level of a high image was a reach in plan: holes closed, and rims grew by pixels.
+#[test]
+fn coarse_grey_levels_leave_the_plan_of_an_image_alone() {
+    // Nine pixels a side, the middle one transparent: of 8 x 8 cells the four around it are missing.
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 9, 9);
+    encoder.set_color(png::ColorType::GrayscaleAlpha);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().unwrap();
+    let alpha = |k: usize| if k == 40 { 0 } else { 255 };
+    let data: Vec<u8> = (0..81).flat_map(|k| [70, alpha(k)]).collect();
+    writer.write_image_data(&data).unwrap();
+    writer.finish().unwrap();
+    let file = read(SurfaceFormat::HeightImage, &bytes).unwrap();
+    let placed = Transform::new(1e-3, &Placement::default()).scaled([0.1, 0.1, 100.0]);
+    let mesh = Mesh::place(file, &placed).unwrap();
+    assert!((mesh.facts().height_rounding_m / (0.5 / 255.0 * 0.1) - 1.0).abs() < 1e-15);
+    let samples = |from: f64, to: f64, count: usize| {
+        let found = sample(&mesh, &grid((from, to, count), (from, to, count)));
+        found.iter().filter(|sample| sample.is_some()).count()
+    };
+    assert_eq!(samples(0.0, 0.8e-3, 81), 81 * 81 - 19 * 19);
+    assert_eq!(samples(-0.1e-3, 0.9e-3, 11), 81 - 1);
+    assert_eq!(samples(0.301e-3, 0.499e-3, 7), 0);
 }
 
 #[test]

@@ -118,7 +118,7 @@ pub fn run(
         relative_to: "1 m".to_owned(),
         method: method.to_owned(),
     };
-    let rounding_m = surface.coordinate_rounding_m();
+    let rounding_m = surface.height_rounding_m();
     let mut accuracy = BTreeMap::from([(
         "points",
         stage(rounding_m, "a-priori: the file's coordinate rounding"),

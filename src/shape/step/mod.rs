@@ -108,6 +108,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         warnings: judged.warnings(),
         bodies: named.collect(),
         read_by: Some(judged.read_by),
+        ..FileMesh::default()
     })
 }
 
