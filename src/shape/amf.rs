@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::archive::{Archive, text_of};
-use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::assembly::{Affine, Body, LaidOut, corner, lay_out};
 use crate::document::parse_unit;
 use crate::file_mesh::FileMesh;
 use crate::number::Numbers;
@@ -182,7 +182,16 @@ impl Reader {
             .filter(|k| !is_child[*k])
             .map(|k| (k, Affine::IDENTITY))
             .collect();
-        let triangles = lay_out(&self.bodies, &roots)?;
+        let numbers = &self.numbers;
+        let LaidOut {
+            triangles,
+            coordinate_rounding,
+        } = lay_out(
+            &self.bodies,
+            &roots,
+            |_| numbers.rounding(),
+            numbers.epsilon(),
+        )?;
         if triangles.is_empty() {
             return Err("the AMF file holds no triangle: export a body".into());
         }
@@ -210,8 +219,8 @@ impl Reader {
             ));
         }
         Ok(FileMesh {
-            coordinate_rounding: self.numbers.rounding_placed(&triangles),
             triangles,
+            coordinate_rounding,
             unit_m: Some(unit_m),
             warnings,
             ..FileMesh::default()

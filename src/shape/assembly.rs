@@ -1,6 +1,7 @@
 //! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
 
 use crate::file_mesh::Triangle;
+use crate::number::F32_ROUNDING;
 
 /// Placing bodies several times may add so many triangles to those of the file,
 const MOST_ADDED: u64 = 10_000_000;
@@ -51,6 +52,82 @@ impl Affine {
             shift: self.apply(inner.shift),
         }
     }
+
+    /// The magnitudes of its numbers.
+    fn magnitudes(&self) -> Self {
+        Self {
+            rows: self.rows.map(|row| row.map(f64::abs)),
+            shift: self.shift.map(f64::abs),
+        }
+    }
+
+    /// How far its numbers may lie from what was meant, each a magnitude: of a shift the share `epsilon`
+    /// of it, of a turn or a factor that is no whole number the same share of the largest.
+    fn roundings(&self, epsilon: f64) -> Self {
+        let Self { rows, shift } = self.magnitudes();
+        let largest = rows.as_flattened().iter().fold(0.0, |m: f64, v| m.max(*v));
+        let of = |v: f64| {
+            if v.fract() == 0.0 {
+                0.0
+            } else {
+                epsilon * largest
+            }
+        };
+        Self {
+            rows: rows.map(|row| row.map(of)),
+            shift: shift.map(|v| epsilon * v),
+        }
+    }
+}
+
+/// A composed placement, and how far its numbers may lie from what was meant.
+#[derive(Clone, Copy)]
+struct Placed {
+    place: Affine,
+    roundings: Affine,
+}
+
+impl Placed {
+    fn new(place: Affine, epsilon: f64) -> Self {
+        Self {
+            place,
+            roundings: place.roundings(epsilon),
+        }
+    }
+
+    /// First `inner`, then this: what the numbers of each are off goes through those of the other.
+    fn after(&self, inner: &Self) -> Self {
+        let linear = Affine {
+            shift: [0.0; 3],
+            ..self.place.magnitudes()
+        };
+        let (own, outer) = (
+            linear.after(&inner.roundings),
+            self.roundings.after(&inner.place.magnitudes()),
+        );
+        let sum = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k] + b[k]);
+        Self {
+            place: self.place.after(&inner.place),
+            roundings: Affine {
+                rows: [0, 1, 2].map(|k| sum(own.rows[k], outer.rows[k])),
+                shift: sum(own.shift, outer.shift),
+            },
+        }
+    }
+
+    /// How far a coordinate may lie from what was meant once it is placed: before, it was `own` for coordinates
+    /// up to `far`.
+    fn rounding(&self, own: f64, far: [f64; 3]) -> f64 {
+        let linear = Affine {
+            shift: [0.0; 3],
+            ..self.place.magnitudes()
+        };
+        let (read, placed) = (linear.apply([own; 3]), self.roundings.apply(far));
+        [0, 1, 2]
+            .map(|k| read[k] + placed[k])
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
 }
 
 /// A body of an assembly: its own triangles, and bodies placed in it.
@@ -74,11 +151,25 @@ pub(super) fn corner(vertices: &[[f64; 3]], index: usize) -> Result<[f64; 3], St
     })
 }
 
-/// Lays out `roots`: every triangle of the bodies below, placed.
+/// What [`lay_out`] makes of an assembly.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct LaidOut {
+    pub(super) triangles: Vec<Triangle>,
+    /// How far a coordinate may lie from what was meant: what cancels in a placement leaves its rounding.
+    pub(super) coordinate_rounding: f64,
+}
+
+/// Lays out `roots`: every triangle of the bodies below, placed. `own` states the rounding of a body's
+/// coordinates, of which these are the largest along each axis; `epsilon` is that of placements, relative.
 ///
 /// # Errors
 /// A body within itself, too many triangles, bodies nested too deep.
-pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<Triangle>, String> {
+pub(super) fn lay_out(
+    bodies: &[Body],
+    roots: &[(usize, Affine)],
+    own: impl Fn([f64; 3]) -> f64,
+    epsilon: f64,
+) -> Result<LaidOut, String> {
     let mut visits = vec![None; bodies.len()];
     // Bodies within themselves are a fault of the file also where nothing places them.
     for body in 0..bodies.len() {
@@ -88,22 +179,47 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
     for (root, _) in roots {
         total.add(weight(bodies, *root, &mut visits, 0)?);
     }
-    let own: u64 = bodies.iter().map(|body| body.triangles.len() as u64).sum();
-    if total.triangles > own + MOST_ADDED || total.placements > MOST_PLACEMENTS {
+    let in_file: u64 = bodies.iter().map(|body| body.triangles.len() as u64).sum();
+    if total.triangles > in_file + MOST_ADDED || total.placements > MOST_PLACEMENTS {
         return Err(format!(
-            "the placed bodies add up to more than the file's {own} triangles and {MOST_ADDED} \
+            "the placed bodies add up to more than the file's {in_file} triangles and {MOST_ADDED} \
              copies of them, or {MOST_PLACEMENTS} placements; export fewer bodies or a coarser mesh"
         ));
     }
-    let mut triangles = Vec::with_capacity(usize::try_from(total.triangles).unwrap_or(0));
+    let read = |body: &Body| {
+        let far = farthest(&body.triangles);
+        (own(far), far)
+    };
+    let assembly = Assembly {
+        bodies,
+        read: bodies.iter().map(read).collect(),
+        epsilon,
+    };
+    let mut laid_out = LaidOut {
+        triangles: Vec::with_capacity(usize::try_from(total.triangles).unwrap_or(0)),
+        ..LaidOut::default()
+    };
     for (root, place) in roots {
-        add(bodies, *root, place, &mut triangles);
+        assembly.add(*root, &Placed::new(*place, epsilon), &mut laid_out);
     }
-    let mut coordinates = triangles.as_flattened().as_flattened().iter();
+    let mut coordinates = laid_out.triangles.as_flattened().as_flattened().iter();
     if coordinates.any(|c| !c.is_finite()) {
         return Err("a placement moves a body beyond all numbers".into());
     }
-    Ok(triangles)
+    Ok(laid_out)
+}
+
+/// The rounding of coordinates stored as f32, of which these are the largest along each axis.
+pub(super) fn floats_rounding(far: [f64; 3]) -> f64 {
+    far[0].max(far[1]).max(far[2]) * F32_ROUNDING
+}
+
+/// The largest magnitude along each axis.
+pub(super) fn farthest(triangles: &[Triangle]) -> [f64; 3] {
+    let corners = triangles.as_flattened().iter();
+    corners.fold([0.0; 3], |far: [f64; 3], p| {
+        [0, 1, 2].map(|k| far[k].max(p[k].abs()))
+    })
 }
 
 /// How many triangles [`lay_out`] makes of each root.
@@ -167,21 +283,85 @@ fn weight(
     Ok(sum)
 }
 
-fn add(bodies: &[Body], index: usize, place: &Affine, triangles: &mut Vec<Triangle>) {
-    let body = &bodies[index];
-    if *place == Affine::IDENTITY {
-        triangles.extend_from_slice(&body.triangles);
-    } else {
-        triangles.extend(body.triangles.iter().map(|t| t.map(|v| place.apply(v))));
-    }
-    for (child, inner) in &body.children {
-        add(bodies, *child, &place.after(inner), triangles);
+/// Bodies that are laid out.
+struct Assembly<'a> {
+    bodies: &'a [Body],
+    /// The rounding of each body's own coordinates, and the largest of them.
+    read: Vec<(f64, [f64; 3])>,
+    epsilon: f64,
+}
+
+impl Assembly<'_> {
+    fn add(&self, index: usize, placed: &Placed, laid_out: &mut LaidOut) {
+        let (body, place) = (&self.bodies[index], &placed.place);
+        let triangles = &mut laid_out.triangles;
+        if *place == Affine::IDENTITY {
+            triangles.extend_from_slice(&body.triangles);
+        } else {
+            triangles.extend(body.triangles.iter().map(|t| t.map(|v| place.apply(v))));
+        }
+        if !body.triangles.is_empty() {
+            let (own, far) = self.read[index];
+            let rounding = placed.rounding(own, far);
+            laid_out.coordinate_rounding = laid_out.coordinate_rounding.max(rounding);
+        }
+        for (child, inner) in &body.children {
+            let inner = Placed::new(*inner, self.epsilon);
+            self.add(*child, &placed.after(&inner), laid_out);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn of(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<LaidOut, String> {
+        lay_out(
+            bodies,
+            roots,
+            |far| 1e-3 * far[0].max(far[1]).max(far[2]),
+            1e-3,
+        )
+    }
+
+    /// Numbers that cancelled took their roundings along: of a part read far away nothing was stated.
+    #[test]
+    fn what_cancels_leaves_its_rounding() {
+        let body = Body {
+            triangles: vec![[[3000.0, 0.7, 1.3]; 3]],
+            children: Vec::new(),
+        };
+        let shifted = |shift: f64| Affine {
+            shift: [shift, 0.0, 0.0],
+            ..Affine::IDENTITY
+        };
+        let rounding = |bodies: &[Body], root, place| {
+            of(bodies, &[(root, place)]).unwrap().coordinate_rounding
+        };
+        let still = [body.clone()];
+        assert_eq!(rounding(&still, 0, Affine::IDENTITY), 3.0);
+        assert_eq!(rounding(&still, 0, shifted(-3000.0)), 6.0);
+        // Two shifts that undo each other, the inner one enlarged; and a turn, whose numbers are rounded too.
+        let nested = [
+            Body {
+                triangles: Vec::new(),
+                children: vec![(1, shifted(-3000.0))],
+            },
+            body,
+        ];
+        let twice = Affine {
+            rows: [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]],
+            ..shifted(70.0)
+        };
+        assert!((rounding(&nested, 0, twice) - 12.07).abs() < 1e-12);
+        let turned = Affine {
+            rows: [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]],
+            ..shifted(0.0)
+        };
+        let found = rounding(&still, 0, turned);
+        assert!((found - (1.4 * 3.0 + 3.0007)).abs() < 1e-12, "{found}");
+    }
 
     #[test]
     fn placements_compose() {
@@ -212,7 +392,7 @@ mod tests {
             let down = chain(length, &|k| (k + 1 < length).then_some(k + 1));
             let up = chain(length, &|k| k.checked_sub(1));
             for (bodies, root) in [(down, 0), (up, length - 1)] {
-                let found = lay_out(&bodies, &[(root, Affine::IDENTITY)]);
+                let found = of(&bodies, &[(root, Affine::IDENTITY)]);
                 assert_eq!(found.is_ok(), whole, "{length}");
             }
         }
@@ -229,13 +409,9 @@ mod tests {
             .collect();
         bodies.push(Body::default());
         let roots = [(0, Affine::IDENTITY)];
-        assert!(lay_out(&bodies, &roots).unwrap_err().contains("more than"));
+        assert!(of(&bodies, &roots).unwrap_err().contains("more than"));
         bodies[39].children.push((3, Affine::IDENTITY));
-        assert!(
-            lay_out(&bodies, &roots)
-                .unwrap_err()
-                .contains("within itself")
-        );
+        assert!(of(&bodies, &roots).unwrap_err().contains("within itself"));
     }
 
     #[test]
@@ -248,8 +424,8 @@ mod tests {
             },
         ];
         let mut roots = vec![(1, Affine::IDENTITY); 1000];
-        assert_eq!(lay_out(&bodies, &roots), Ok(Vec::new()));
+        assert_eq!(of(&bodies, &roots), Ok(LaidOut::default()));
         roots.push((0, Affine::IDENTITY));
-        assert!(lay_out(&bodies, &roots).unwrap_err().contains("placements"));
+        assert!(of(&bodies, &roots).unwrap_err().contains("placements"));
     }
 }

@@ -8,7 +8,7 @@ use gltf::json::Root;
 use gltf::mesh::Mode;
 use gltf::{Document, Node, Semantic};
 
-use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::assembly::{Affine, Body, LaidOut, corner, floats_rounding, lay_out};
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
 use crate::read_error::ReadError;
@@ -76,16 +76,17 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         .nodes()
         .map(|node| (meshes + node.index(), UPWARDS))
         .collect();
-    let triangles = lay_out(&bodies, &roots).map_err(ReadError::file)?;
+    let LaidOut {
+        triangles,
+        coordinate_rounding,
+    } = lay_out(&bodies, &roots, floats_rounding, F32_ROUNDING).map_err(ReadError::file)?;
     if triangles.is_empty() {
         let what = "the GLB file's scene holds no triangle: export a body as a mesh";
         return Err(ReadError::file(what));
     }
-    let coordinates = triangles.as_flattened().as_flattened().iter();
-    let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
     Ok(FileMesh {
         triangles,
-        coordinate_rounding: largest * F32_ROUNDING,
+        coordinate_rounding,
         unit_m: Some(1.0),
         warnings,
         ..FileMesh::default()

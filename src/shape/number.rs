@@ -1,7 +1,5 @@
 //! Coordinates written as text: their values, and how finely the text states them.
 
-use crate::file_mesh::Triangle;
-
 /// A text whose numbers all have fewer digits than a printed float wrote them exactly.
 const PRINTED_DIGITS: usize = 6;
 /// A number with more digits may show that it never was a single-precision float.
@@ -49,32 +47,24 @@ impl Numbers {
         }
     }
 
-    /// Half a unit of the last printed digit at the largest coordinate, and f32's rounding unless
-    /// the digits show something finer: most programs print floats.
-    pub(super) fn rounding(&self) -> f64 {
-        let epsilon = if self.finer_than_float {
+    /// Relative rounding of the numbers before they were printed.
+    pub(super) fn epsilon(&self) -> f64 {
+        if self.finer_than_float {
             f64::EPSILON
         } else {
             F32_ROUNDING
-        };
-        let stored = self.largest * epsilon;
+        }
+    }
+
+    /// Half a unit of the last printed digit at the largest coordinate, and f32's rounding unless
+    /// the digits show something finer: most programs print floats.
+    pub(super) fn rounding(&self) -> f64 {
+        let stored = self.largest * self.epsilon();
         if self.digits < PRINTED_DIGITS || self.largest == 0.0 {
             return stored;
         }
         let decade = self.largest.log10().floor() + 1.0 - self.digits as f64;
         stored.max(0.5 * 10f64.powf(decade))
-    }
-
-    /// The same after placing: the numbers grew with the largest coordinate of `triangles`.
-    pub(super) fn rounding_placed(&self, triangles: &[Triangle]) -> f64 {
-        let coordinates = triangles.as_flattened().as_flattened().iter();
-        let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
-        let growth = if self.largest > 0.0 {
-            largest / self.largest
-        } else {
-            1.0
-        };
-        self.rounding() * growth.max(1.0)
     }
 }
 
@@ -90,29 +80,4 @@ fn significant_digits(word: &[u8]) -> usize {
 /// A word for a message, at most 20 bytes of it: a document may name any file as a surface.
 pub(super) fn shown(word: &[u8]) -> String {
     word[..word.len().min(20)].escape_ascii().to_string()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn placing_adds_the_rounding_of_what_it_adds() {
-        let read = |words: [&str; 3]| {
-            let mut numbers = Numbers::default();
-            for word in words {
-                numbers.read(word.as_bytes()).unwrap();
-            }
-            numbers
-        };
-        let at = |c: f64| [[[c, -0.3, 0.1]; 3]];
-        let numbers = read(["0.7", "-1.3", "0"]);
-        let own = numbers.rounding();
-        assert_eq!(own, 1.3 * F32_ROUNDING);
-        // Nearer to the origin a number is no finer than it was read.
-        assert_eq!(numbers.rounding_placed(&at(0.9)), own);
-        assert_eq!(numbers.rounding_placed(&at(-13.0)), own * 10.0);
-        // Zeros are exact, wherever they are placed.
-        assert_eq!(read(["0", "-0.0", "0e3"]).rounding_placed(&at(13.0)), 0.0);
-    }
 }

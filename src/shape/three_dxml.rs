@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use crate::archive::Archive;
-use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::assembly::{Affine, Body, LaidOut, corner, lay_out};
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::Numbers;
 use crate::read_error::{Place, ReadError};
@@ -148,15 +148,19 @@ impl Structure {
         let root = root
             .and_then(|id| index.get(&id).copied())
             .ok_or_else(|| fault("the product has no root reference".into()))?;
-        let triangles = lay_out(&bodies, &[(root, Affine::IDENTITY)]).map_err(fault)?;
+        let roots = [(root, Affine::IDENTITY)];
+        let LaidOut {
+            triangles,
+            coordinate_rounding,
+        } = lay_out(&bodies, &roots, |_| numbers.rounding(), numbers.epsilon()).map_err(fault)?;
         if triangles.is_empty() {
             let what =
                 "the 3DXML file holds no tessellated triangle; export the body as 3MF or STL";
             return Err(fault(what.into()));
         }
         Ok(FileMesh {
-            coordinate_rounding: numbers.rounding_placed(&triangles),
             triangles,
+            coordinate_rounding,
             unit_m: Some(1e-3),
             ..FileMesh::default()
         })

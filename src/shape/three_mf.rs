@@ -7,7 +7,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::archive::Archive;
-use crate::assembly::{Affine, Body, corner, counts, lay_out};
+use crate::assembly::{Affine, Body, LaidOut, corner, counts, lay_out};
 use crate::bodies::NamedBody;
 use crate::document::parse_unit;
 use crate::file_mesh::FileMesh;
@@ -242,7 +242,17 @@ impl Model {
             let what = "the 3MF file builds nothing: its `build` has no item; export it again";
             return Err(fault(what.into()));
         }
-        let triangles = lay_out(&self.bodies, &roots).map_err(fault)?;
+        let numbers = &self.numbers;
+        let LaidOut {
+            triangles,
+            coordinate_rounding,
+        } = lay_out(
+            &self.bodies,
+            &roots,
+            |_| numbers.rounding(),
+            numbers.epsilon(),
+        )
+        .map_err(fault)?;
         if triangles.is_empty() {
             let what = "the 3MF file's build has no triangle: export a body as a mesh";
             return Err(fault(what.into()));
@@ -271,8 +281,8 @@ impl Model {
             ));
         }
         Ok(FileMesh {
-            coordinate_rounding: self.numbers.rounding_placed(&triangles),
             triangles,
+            coordinate_rounding,
             unit_m: Some(unit_m),
             bodies: named.collect(),
             warnings,

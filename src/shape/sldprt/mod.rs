@@ -16,8 +16,8 @@ use self::container::Blocks;
 use self::display::Table;
 use self::product::Product;
 use crate::archive::text_of;
+use crate::assembly::{LaidOut, farthest, floats_rounding};
 use crate::file_mesh::{FileMesh, Triangle};
-use crate::number::F32_ROUNDING;
 use crate::read_error::{Place, ReadError};
 use crate::tessellation::face_deviation;
 
@@ -90,31 +90,35 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
          face); compare with a STEP, STL or 3MF file of the same part",
         deviation * 1000.0
     )];
-    let triangles = match product {
+    let LaidOut {
+        triangles,
+        coordinate_rounding,
+    } = match product {
         None => {
             let mut triangles = Vec::new();
             for table in &tables {
                 table.read(&stream, &mut triangles)?;
             }
-            triangles
+            let coordinate_rounding = floats_rounding(farthest(&triangles));
+            LaidOut {
+                triangles,
+                coordinate_rounding,
+            }
         }
         Some(product) => {
-            let (triangles, hidden) = product.lay_out(&stream, &tables)?;
+            let (laid_out, hidden) = product.lay_out(&stream, &tables)?;
             if hidden > 0 {
                 warnings.push(format!(
                     "{hidden} hidden or suppressed components of the assembly are left out"
                 ));
             }
-            triangles
+            laid_out
         }
     };
     if triangles.is_empty() {
         let what = format!("every component of the assembly is hidden or suppressed: {ADVICE}");
         return Err(ReadError::file(what));
     }
-    let [min, max] = box_of(&triangles);
-    let largest = (min.iter().chain(&max)).fold(0.0, |m: f64, c| m.max(c.abs()));
-    let coordinate_rounding = largest * F32_ROUNDING;
     Ok(FileMesh {
         triangles,
         coordinate_rounding,

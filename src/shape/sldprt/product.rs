@@ -9,8 +9,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::display::Table;
 use super::{ADVICE, box_of};
-use crate::assembly::{Affine, Body, lay_out};
+use crate::assembly::{Affine, Body, LaidOut, floats_rounding, lay_out};
 use crate::file_mesh::Triangle;
+use crate::number::F32_ROUNDING;
 use crate::read_error::ReadError;
 use crate::xml::{Document, Element, Step};
 
@@ -104,7 +105,7 @@ impl Product {
         &self,
         stream: &[u8],
         tables: &[Table],
-    ) -> Result<(Vec<Triangle>, usize), ReadError> {
+    ) -> Result<(LaidOut, usize), ReadError> {
         let index: HashMap<&str, usize> = (self.models.iter().enumerate())
             .map(|(k, model)| (model.id.as_str(), k))
             .collect();
@@ -141,8 +142,10 @@ impl Product {
                 .filter(|k| shown[*k] && self.models[*k].references.is_empty());
             return Err(ReadError::file(lacks(&missing, all.count())));
         }
-        let triangles = lay_out(&bodies, &[(root, Affine::IDENTITY)]).map_err(ReadError::file)?;
-        Ok((triangles, hidden))
+        let roots = [(root, Affine::IDENTITY)];
+        let laid_out =
+            lay_out(&bodies, &roots, floats_rounding, F32_ROUNDING).map_err(ReadError::file)?;
+        Ok((laid_out, hidden))
     }
 
     /// The one model that nothing places.
