@@ -15,8 +15,13 @@ const HEADS: [&[u8]; 8] = [
 
 /// True for bytes that begin as OFF files do.
 pub(crate) fn begins(bytes: &[u8]) -> bool {
-    let first = bytes.trim_ascii_start().split(|b| *b <= b' ').next();
-    HEADS.iter().any(|head| first == Some(*head))
+    let bytes = narrow(&bytes[..bytes.len().min(4096) & !1]);
+    let mut rest = Rest(Lines::new(&bytes));
+    rest.next().is_ok_and(|(_, words)| is_head(words[0]))
+}
+
+fn is_head(word: &[u8]) -> bool {
+    HEADS.contains(&word)
 }
 
 /// A line's number and words.
@@ -83,9 +88,17 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         );
         return Err(ReadError::file(what));
     }
+    let mut warnings = Vec::new();
+    if rest.next().is_ok() {
+        warnings.push(format!(
+            "the OFF file goes on after the {faces} faces that it claims, and that is left out: the count is \
+             wrong or something was appended; export it again"
+        ));
+    }
     Ok(FileMesh {
         triangles,
         coordinate_rounding: numbers.rounding(),
+        warnings,
         ..FileMesh::default()
     })
 }
@@ -93,7 +106,12 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
 /// The numbers of vertices and faces, after the head or on the line below it.
 fn counts(bytes: &[u8], rest: &mut Rest<'_>) -> Result<[usize; 2], ReadError> {
     let (number, mut words) = rest.next()?;
-    if !begins(bytes) || starts(words.get(1).unwrap_or(&&b""[..]), b"BINARY") {
+    if words.get(1).is_some_and(|word| starts(word, b"BINARY")) {
+        let what =
+            "this OFF file is binary, which is not read: save it in ASCII, or as binary PLY or STL";
+        return Err(ReadError::file(what));
+    }
+    if !is_head(words[0]) {
         let what = format!(
             "expected an OFF file in ASCII, which begins with `OFF`, found `{}`",
             shown(words[0])

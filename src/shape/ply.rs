@@ -1,10 +1,10 @@
 //! PLY, ASCII or binary: the elements `vertex` (x, y, z) and `face` (a list of indices).
 //!
-//! The `ply-rs-bw` crate parses; here the header's counts are held against the file's length
-//! before anything is read, and only positions and indices are kept. The file carries no unit.
+//! The `ply-rs-bw` crate parses headers and binary bodies; here the header's counts are held against
+//! the file's length before anything is read, and only positions and indices are kept. The file
+//! carries no unit.
 
-use std::borrow::Cow;
-use std::io::BufRead;
+mod ascii;
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
@@ -16,9 +16,13 @@ use crate::file_mesh::FileMesh;
 use crate::number::{F32_ROUNDING, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::ReadError;
+use crate::text::{narrow, starts};
 
 /// Elements that the parser makes at once: it allocates for each.
 const AT_ONCE: usize = 1 << 12;
+
+/// A header of more bytes is none that a program wrote.
+const LONGEST_HEADER: usize = 1 << 20;
 
 /// Reads a PLY file's bytes.
 ///
@@ -26,45 +30,75 @@ const AT_ONCE: usize = 1 << 12;
 /// [`ReadError`]: a header that is none or claims more than the file can hold, coordinates that
 /// are not finite, an index without a vertex, points without a face.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
-    let first = bytes.trim_ascii_start();
-    if !begins(bytes) {
+    let bytes = narrow(bytes);
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    let bytes = bytes.trim_ascii_start();
+    if !bytes.starts_with(b"ply") {
         let what = format!(
             "this is not a PLY file: it begins with `{}` instead of `ply`",
-            shown(&first[..first.len().min(16)])
+            shown(&bytes[..bytes.len().min(16)])
         );
         return Err(ReadError::file(what));
     }
-    let bytes = plain_header(bytes);
-    let mut rest: &[u8] = &bytes;
-    let mut reader = Reader::new(&mut rest);
+    let Split {
+        header,
+        lines,
+        body,
+    } = split(bytes)?;
     let header = Parser::<Skipped>::new()
-        .read_header(&mut reader)
+        .read_header(&mut Reader::new(&mut &header[..]))
         .map_err(fault)?;
-    let length = reader.get_mut().fill_buf().map_or(0, <[u8]>::len);
-    check(&header, length)?;
-    let mut vertices: Vec<Vertex> = Vec::new();
+    check(&header, body.len())?;
+    if header.encoding == Encoding::Ascii {
+        let body = ascii::read(&header, body, lines)?;
+        return mesh(body);
+    }
+    let mut rest = body;
+    let mut reader = Reader::new(&mut rest);
+    let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut faces = Read::default();
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
                 // The count was held against the file's length.
                 vertices.reserve_exact(element.count);
-                each(&mut reader, element, &header, |vertex| {
+                each(&mut reader, element, &header, |Vertex(vertex)| {
                     vertices.push(vertex);
                     Ok(())
                 })?;
             }
             "face" => each(&mut reader, element, &header, |face: Face| {
-                faces.face(&face)
+                faces.face(&face.0)
             })?,
             "tristrips" => each(&mut reader, element, &header, |strips: Face| {
-                faces.strips(&strips);
+                faces.strips(&strips.0);
                 Ok(())
             })?,
             _ => each(&mut reader, element, &header, |_: Skipped| Ok(()))?,
         }
     }
-    mesh(&header, &vertices, &faces)
+    let largest = vertices.as_flattened().iter();
+    let largest = largest.fold(0.0, |m: f64, c| m.max(c.abs()));
+    let epsilon = if has_doubles(&header) {
+        f64::EPSILON
+    } else {
+        F32_ROUNDING
+    };
+    mesh(Body {
+        vertices,
+        faces,
+        coordinate_rounding: largest * epsilon,
+        goes_on: !rest.trim_ascii().is_empty(),
+    })
+}
+
+/// What a file holds after its header.
+struct Body {
+    vertices: Vec<[f64; 3]>,
+    faces: Read,
+    coordinate_rounding: f64,
+    /// Whether there is more than the header states.
+    goes_on: bool,
 }
 
 /// Reads an element's entries, some at a time.
@@ -99,20 +133,20 @@ struct Read {
 }
 
 impl Read {
-    fn face(&mut self, face: &Face) -> Result<(), ReadError> {
-        if face.0.len() > MOST_CORNERS {
+    fn face(&mut self, face: &[i64]) -> Result<(), ReadError> {
+        if face.len() > MOST_CORNERS {
             return Err(ReadError::file(format!(
                 "face {} (from 0) has more than {MOST_CORNERS} corners",
                 self.number
             )));
         }
-        self.add(face.0.iter().copied());
+        self.add(face.iter().copied());
         Ok(())
     }
 
     /// A strip of triangles, or several with -1 between them.
-    fn strips(&mut self, strips: &Face) {
-        for strip in strips.0.split(|index| *index == -1) {
+    fn strips(&mut self, strips: &[i64]) {
+        for strip in strips.split(|index| *index == -1) {
             for (k, w) in strip.windows(3).enumerate() {
                 // Every other triangle of a strip runs the other way.
                 let corners = [w[k % 2], w[1 - k % 2], w[2]];
@@ -140,7 +174,7 @@ impl Read {
 
 /// True for bytes that begin as PLY files do.
 pub(crate) fn begins(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().starts_with(b"ply")
+    starts(&narrow(&bytes[..bytes.len().min(64) & !1]), b"ply")
 }
 
 /// First words of a header's lines.
@@ -154,34 +188,53 @@ const HEADER: [&[u8]; 7] = [
     b"end_header",
 ];
 
-/// The file with a header that the parser takes: comments may be in any encoding, and some
-/// programs wrote them without the word `comment`.
-fn plain_header(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let mark = b"end_header";
-    let end = bytes.windows(mark.len()).position(|w| w == mark);
-    let header = &bytes[..end.unwrap_or(bytes.len())];
-    let first = |line: &[u8]| {
-        let word = line.trim_ascii_start().split(|b| *b <= b' ').next();
-        word.unwrap_or_default().to_vec()
+/// A file's header and what follows it.
+struct Split<'a> {
+    /// As the parser takes it.
+    header: Vec<u8>,
+    /// Its lines.
+    lines: usize,
+    body: &'a [u8],
+}
+
+/// Parts header and body. Lines end as the first one does, by LF, CRLF or CR alone; comments may be in any
+/// encoding, and some programs wrote them without the word `comment`.
+///
+/// # Errors
+/// [`ReadError`]: no end of the header.
+fn split(bytes: &[u8]) -> Result<Split<'_>, ReadError> {
+    let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'));
+    let end = match first {
+        Some(at) if bytes[at] == b'\r' && bytes.get(at + 1) != Some(&b'\n') => b'\r',
+        _ => b'\n',
     };
-    let known = |line: &[u8]| {
-        let word = first(line);
-        word.is_empty() || HEADER.contains(&word.as_slice())
-    };
-    let lines = || header.split_inclusive(|b| matches!(b, b'\n' | b'\r'));
-    if end.is_none() || (header.is_ascii() && lines().all(known)) {
-        return Cow::Borrowed(bytes);
-    }
-    let mut copy = Vec::with_capacity(bytes.len() + 64);
-    for line in lines() {
-        if !known(line) {
-            copy.extend_from_slice(b"comment ");
+    let (mut header, mut lines, mut from) = (Vec::new(), 0, 0);
+    for line in bytes.split_inclusive(|b| *b == end) {
+        fluxform_base::progress::poll();
+        lines += 1;
+        from += line.len();
+        let words = line.trim_ascii();
+        let word = words.split(|b| *b <= b' ').next().unwrap_or_default();
+        if !word.is_empty() && !HEADER.contains(&word) {
+            header.extend_from_slice(b"comment ");
         }
-        let plain = |b: &u8| if b.is_ascii() { *b } else { b'?' };
-        copy.extend(line.iter().map(plain));
+        header.extend(words.iter().map(|b| if b.is_ascii() { *b } else { b'?' }));
+        header.push(b'\n');
+        if word == b"end_header" {
+            let body = &bytes[from..];
+            return Ok(Split {
+                header,
+                lines,
+                body,
+            });
+        }
+        if from > LONGEST_HEADER {
+            break;
+        }
     }
-    copy.extend_from_slice(&bytes[header.len()..]);
-    Cow::Owned(copy)
+    Err(ReadError::file(
+        "the PLY file is damaged: its header has no end (`end_header`); export or copy it again",
+    ))
 }
 
 fn fault(error: ParseError) -> ReadError {
@@ -259,7 +312,13 @@ fn size(kind: &ScalarType) -> u128 {
     }
 }
 
-fn mesh(header: &Header, vertices: &[Vertex], read: &Read) -> Result<FileMesh, ReadError> {
+fn mesh(body: Body) -> Result<FileMesh, ReadError> {
+    let Body {
+        vertices,
+        faces: read,
+        coordinate_rounding,
+        goes_on,
+    } = body;
     if read.faces.is_empty() {
         return Err(ReadError::file(format!(
             "the PLY file holds {} points and no face: there is no surface; make a mesh of them \
@@ -267,15 +326,13 @@ fn mesh(header: &Header, vertices: &[Vertex], read: &Read) -> Result<FileMesh, R
             vertices.len()
         )));
     }
-    let mut largest = 0.0f64;
-    for (number, Vertex(vertex)) in vertices.iter().enumerate() {
+    for (number, vertex) in vertices.iter().enumerate() {
         if let Some(bad) = vertex.iter().find(|c| !c.is_finite()) {
             return Err(ReadError::file(format!(
                 "vertex {number} (from 0) has a coordinate that is {bad}, not a finite number; \
                  repair the mesh and export it again"
             )));
         }
-        largest = vertex.iter().fold(largest, |m, c| m.max(c.abs()));
     }
     let without_vertex = |number: usize, index: i64| {
         ReadError::file(format!(
@@ -287,8 +344,7 @@ fn mesh(header: &Header, vertices: &[Vertex], read: &Read) -> Result<FileMesh, R
     if let Some((number, index)) = read.astray {
         return Err(without_vertex(number, index));
     }
-    let points: Vec<[f64; 3]> = vertices.iter().map(|vertex| vertex.0).collect();
-    let cut = read.faces.cut(&points);
+    let cut = read.faces.cut(&vertices);
     let (triangles, short) =
         cut.map_err(|(number, index)| without_vertex(number, i64::from(index)))?;
     if triangles.is_empty() {
@@ -301,12 +357,16 @@ fn mesh(header: &Header, vertices: &[Vertex], read: &Read) -> Result<FileMesh, R
             "{short} faces with fewer than three corners are left out"
         ));
     }
-    // How many digits a text has is not known here; as a rule they were floats.
-    let double = header.encoding != Encoding::Ascii && has_doubles(header);
-    let epsilon = if double { f64::EPSILON } else { F32_ROUNDING };
+    if goes_on {
+        warnings.push(
+            "the PLY file goes on after the elements that its header states, and that is left out: the \
+             header is wrong or something was appended; export it again"
+                .into(),
+        );
+    }
     Ok(FileMesh {
         triangles,
-        coordinate_rounding: largest * epsilon,
+        coordinate_rounding,
         warnings,
         ..FileMesh::default()
     })

@@ -182,10 +182,14 @@ fn a_ply_header_is_held_against_the_file() {
         ),
         ("3 0 1 -1", "1", "has the index -1"),
         ("2 0 1", "1", "no face of the PLY file has three corners"),
-        ("3 0 1 2", "nan", "Line 13"),
-        ("3 0 1 2", "x", "damaged"),
-        ("99 0 1 2", "1", "damaged"),
-        ("", "1", "damaged"),
+        ("3 0 1 2", "nan", "line 13"),
+        ("3 0 1 2", "x", "line 13: expected a number, found `x`"),
+        (
+            "99 0 1 2",
+            "1",
+            "line 14: an element `face` has too few numbers",
+        ),
+        ("", "1", "ends before its last element `face`"),
     ] {
         let message = refusal(SurfaceFormat::Ply, &text(face, z));
         assert!(message.contains(said), "{face} {z}: {message}");

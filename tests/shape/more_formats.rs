@@ -12,8 +12,8 @@ use fluxform_shape::{MeshReport, ShapeError, surface};
 
 use crate::formats::{read, refusal};
 use fluxform_testing::surface_files::{
-    amf, glb, height_image, obj, off, ply_ascii, ply_strips, sldprt, step, three_dxml, three_mf,
-    three_mf_model, three_mf_of,
+    amf, glb, height_image, obj, off, ply_ascii, ply_binary, ply_strips, sldprt, step, three_dxml,
+    three_mf, three_mf_model, three_mf_of,
 };
 use fluxform_testing::surfaces::{binary, grid, sample};
 
@@ -84,6 +84,108 @@ fn every_further_format_gives_the_same_body() {
         for (k, corner) in [0.7, 1.3, 2.9].iter().enumerate() {
             assert!((report.bounds_max[k] - corner).abs() < 1e-6, "{report:?}");
         }
+    }
+}
+
+/// Marks of order, UTF-16 and lines that end by CR alone were refused, some by messages that contradict themselves.
+#[test]
+fn ply_and_off_are_read_in_every_encoding_and_with_every_end_of_line() {
+    use SurfaceFormat::{Off, Ply};
+    let marked = |text: Vec<u8>| [b"\xef\xbb\xbf".to_vec(), text].concat();
+    let old_mac = |text: Vec<u8>| {
+        String::from_utf8(text)
+            .unwrap()
+            .replace('\n', "\r")
+            .into_bytes()
+    };
+    let mut binary = ply_binary(false);
+    let end = binary.windows(10).position(|w| w == b"end_header").unwrap() + 11;
+    for b in &mut binary[..end] {
+        if *b == b'\n' {
+            *b = b'\r';
+        }
+    }
+    for (format, bytes) in [
+        (Ply, marked(ply_ascii())),
+        (Ply, wide(&ply_ascii(), u16::to_le_bytes)),
+        (Ply, wide(&ply_ascii(), u16::to_be_bytes)),
+        (Ply, old_mac(ply_ascii())),
+        (Ply, binary),
+        (Off, marked(off())),
+        (Off, wide(&off(), u16::to_le_bytes)),
+        (Off, old_mac(off())),
+    ] {
+        assert_eq!(SurfaceFormat::of_content(&bytes), Some(format));
+        let report = MeshReport::new(format, read(format, &bytes).unwrap());
+        assert_eq!(report.triangles, 4, "{format:?}");
+        assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{report:?}");
+    }
+    let message = refusal(Off, b"OFF BINARY\n\0\0\0\x04");
+    assert!(
+        message.contains("binary") && message.contains("save it"),
+        "{message}"
+    );
+}
+
+/// Faces beyond the header's count were left out without a word, and what is no number was called no element.
+#[test]
+fn what_a_ply_or_off_header_leaves_out_is_a_warning() {
+    use SurfaceFormat::{Off, Ply};
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    let fewer = |bytes: Vec<u8>, from: &str, to: &str| {
+        let text = text(bytes);
+        assert!(text.contains(from), "{text}");
+        text.replace(from, to).into_bytes()
+    };
+    for (format, whole, short) in [
+        (
+            Ply,
+            ply_ascii(),
+            fewer(ply_ascii(), "element face 4", "element face 3"),
+        ),
+        (Off, off(), fewer(off(), "4 4 6", "4 3 6")),
+    ] {
+        assert!(read(format, &whole).unwrap().warnings.is_empty());
+        let found = read(format, &short).unwrap();
+        assert_eq!(found.triangles.len(), 3);
+        assert!(
+            found.warnings[0].contains("goes on"),
+            "{:?}",
+            found.warnings
+        );
+    }
+    let mut longer = ply_binary(true);
+    longer.extend([7; 13]);
+    assert!(read(Ply, &longer).unwrap().warnings[0].contains("goes on"));
+    let broken = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                   property float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+                   end_header\n0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let message = refusal(Ply, broken);
+    assert!(
+        message.contains("line 10") && message.contains("not a finite number"),
+        "{message}"
+    );
+}
+
+/// Their roundings were those of floats, however few digits were printed: points of rims were lost.
+#[test]
+fn ascii_ply_counts_the_digits_as_every_text_does() {
+    let corners = [
+        "27.5591 15.748 11.811",
+        "1.96850 15.748 11.811",
+        "15.748 29.5276 11.811",
+    ];
+    for (kind, requested) in [("float", 0.5e-4), ("double", 0.5e-4)] {
+        let header = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty {kind} x\nproperty {kind} y\n\
+             property {kind} z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        );
+        let ply = format!("{header}{}\n3 0 1 2\n", corners.join("\n"));
+        let off = format!("OFF\n3 1 3\n{}\n3 0 1 2\n", corners.join("\n"));
+        let found = read(SurfaceFormat::Ply, ply.as_bytes()).unwrap();
+        let other = read(SurfaceFormat::Off, off.as_bytes()).unwrap();
+        assert_eq!(found.coordinate_rounding, other.coordinate_rounding);
+        assert!((found.coordinate_rounding - requested).abs() < 1e-12);
     }
 }
 
