@@ -1,9 +1,15 @@
 //! Triangles as a reader of files gives them, and the box around points.
 
 use crate::bodies::NamedBody;
+use fluxform_numerics::vec3::{cross, minus};
 
 /// Three vertices, x, y, z each.
 pub type Triangle = [[f64; 3]; 3];
+
+/// Whether a triangle has an area, by its own numbers: lines and points have none.
+pub(crate) fn has_area(&[a, b, c]: &Triangle) -> bool {
+    cross(minus(b, a), minus(c, a)) != [0.0; 3]
+}
 
 /// Triangles as a file gives them, in the file's own unit.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,9 +1,7 @@
 //! A triangle soup in metres and the facts about it.
 
-use fluxform_numerics::vec3::{cross, minus};
-
 use crate::error::ShapeError;
-use crate::file_mesh::{Bounds, FileMesh, Triangle};
+use crate::file_mesh::{Bounds, FileMesh, Triangle, has_area};
 use crate::placement::Transform;
 
 /// Coordinates beyond this are no length of a haptic surface, m; below it no predicate overflows.
@@ -113,8 +111,4 @@ impl Mesh {
     pub fn facts(&self) -> &MeshFacts {
         &self.facts
     }
-}
-
-fn has_area(&[a, b, c]: &Triangle) -> bool {
-    cross(minus(b, a), minus(c, a)) != [0.0; 3]
 }

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::document::{Fit, Placement};
-use crate::file_mesh::{Bounds, Triangle};
+use crate::file_mesh::{Bounds, Triangle, has_area};
 use fluxform_numerics::vec3::norm;
 
 /// Unit and placement as one map of points; right angles rotate exactly.
@@ -47,14 +47,19 @@ impl Transform {
     #[must_use]
     pub fn seated(self, placement: &Placement, triangles: &[Triangle]) -> (Self, Option<String>) {
         let seat = &placement.seat;
-        if !seat.uses_box() || triangles.is_empty() {
+        if !seat.uses_box() {
             return (self, None);
         }
         let bare = Self {
             translate_m: [0.0; 3],
             ..self.clone()
         };
-        let mut bounds = Bounds::of(triangles.as_flattened().iter().map(|v| bare.apply(*v)));
+        // Triangles without area are no surface and are left out: they must not decide where it goes.
+        let corners = triangles.iter().filter(|t| has_area(t)).flatten();
+        let mut bounds = Bounds::of(corners.map(|v| bare.apply(*v)));
+        if bounds.min_m[0] > bounds.max_m[0] {
+            return (self, None);
+        }
         let (mut growth, mut warning) = (1.0, None);
         if let Some(fit) = &seat.fit {
             (growth, warning) = growth_into(fit, &bounds);
@@ -178,6 +183,7 @@ fn rotation(rotate_deg: [f64; 3]) -> Matrix3<f64> {
 mod tests {
     use super::{Transform, sin_cos_deg};
     use crate::document::Placement;
+    use crate::file_mesh::Triangle;
 
     fn turned(rotate_deg: [f64; 3]) -> Transform {
         Transform::new(
@@ -240,6 +246,24 @@ mod tests {
         assert!((y - 0.025).abs() < 1e-9 && (z - 0.05 * 0.75f64.sqrt()).abs() < 1e-9);
         // Equal ones stay as they are, to the bit.
         assert_eq!(turned([37.0, -23.0, 71.0]).roundings_m([0.7; 3]), [0.7; 3]);
+    }
+
+    /// A point far below the part was what `rest_on_mm` brought to its height.
+    #[test]
+    fn what_has_no_area_decides_no_place() {
+        let low = [[9.0, 9.0, -110.0]; 3];
+        let part = [[0.7, 0.3, 1.3], [10.7, 0.3, 1.3], [0.7, 8.3, 2.9]];
+        let mut placement = Placement::default();
+        placement.seat.rest_on_m = Some(0.02);
+        placement.seat.center = true;
+        let seated = |triangles: &[Triangle]| {
+            let (seated, _) = Transform::new(1e-3, &placement).seated(&placement, triangles);
+            seated
+        };
+        assert_eq!(seated(&[part, low]), seated(&[part]));
+        assert!((seated(&[part, low]).apply([0.0, 0.0, 1.3])[2] - 0.02).abs() < 1e-15);
+        // Without any area there is nothing to seat.
+        assert_eq!(seated(&[low]), Transform::new(1e-3, &placement));
     }
 
     #[test]
