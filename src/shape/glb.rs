@@ -3,10 +3,14 @@
 //! The `gltf` crate parses and checks the document; here what it claims is held against the
 //! file's length. Read are meshes of triangles, strips and fans; z is made to point upwards.
 
+mod extensions;
+
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::Root;
+use gltf::json::mesh::Primitive;
 use gltf::mesh::Mode;
 use gltf::{Document, Node, Semantic};
+use serde_json::Value;
 
 use crate::assembly::{Affine, Body, LaidOut, corner, floats_rounding, lay_out};
 use crate::file_mesh::{FileMesh, Triangle};
@@ -40,8 +44,13 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         let text: String = text.chars().take(200).collect();
         ReadError::file(format!("the GLB file is damaged: {text}"))
     };
-    let root: Root =
-        gltf::json::deserialize::from_slice(json).map_err(|error| damaged(error.to_string()))?;
+    let root: Value = serde_json::from_slice(json).map_err(|error| damaged(error.to_string()))?;
+    let mut warnings = extensions::check(&root).map_err(ReadError::file)?;
+    let mut root: Root = serde_json::from_value(extensions::surface_alone(root))
+        .map_err(|error| damaged(error.to_string()))?;
+    // Those that are left change no triangle.
+    root.extensions_required.clear();
+    check_morphs(&root).map_err(ReadError::file)?;
     // The check that follows takes these indices on trust.
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut indices = primitives.flat_map(|p| p.attributes.values().chain(p.indices.iter()));
@@ -50,7 +59,6 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         return Err(ReadError::file(what));
     }
     let file = Document::from_json(root).map_err(|error| damaged(error.to_string()))?;
-    let mut warnings = Vec::new();
     let mut bodies = Vec::with_capacity(file.meshes().len());
     for mesh in file.meshes() {
         let mut body = Body::default();
@@ -91,6 +99,26 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         warnings,
         ..FileMesh::default()
     })
+}
+
+/// Refuses meshes that morph targets bend as they are at rest.
+fn check_morphs(root: &Root) -> Result<(), String> {
+    let bent = root.nodes.iter().any(|node| {
+        let mesh = node.mesh.and_then(|mesh| root.meshes.get(mesh.value()));
+        let Some(mesh) = mesh else { return false };
+        let weights = node.weights.as_ref().or(mesh.weights.as_ref());
+        let targets = |p: &Primitive| p.targets.as_ref().is_some_and(|t| !t.is_empty());
+        weights.is_some_and(|weights| weights.iter().any(|w| *w != 0.0))
+            && mesh.primitives.iter().any(targets)
+    });
+    match bent {
+        true => Err(
+            "the GLB file bends a mesh by morph targets (shape keys), which are not read: apply \
+                     them and export it again"
+                .into(),
+        ),
+        false => Ok(()),
+    }
 }
 
 /// The document and the data behind it: each a length, a type and so many bytes.
@@ -223,7 +251,15 @@ fn triangles(
             }
         }
         _ => {
-            for [a, b, c] in indices.as_chunks::<3>().0 {
+            let (whole, rest) = indices.as_chunks::<3>();
+            if !rest.is_empty() {
+                return Err(format!(
+                    "the GLB file holds a mesh of {} indices, which are no whole triangles: it is \
+                     damaged; export it again",
+                    indices.len()
+                ));
+            }
+            for [a, b, c] in whole {
                 add(*a, *b, *c)?;
             }
         }

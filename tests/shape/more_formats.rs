@@ -258,6 +258,109 @@ fn coarse_grey_levels_leave_the_plan_of_an_image_alone() {
     assert_eq!(samples(0.301e-3, 0.499e-3, 7), 0);
 }
 
+/// The sample file with a part of its document replaced.
+fn glb_with(from: &str, to: &str) -> Vec<u8> {
+    let bytes = glb();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let json = std::str::from_utf8(&bytes[20..20 + length]).unwrap();
+    assert!(json.contains(from), "{from}");
+    let mut json = json.replacen(from, to, 1).into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let rest = &bytes[20 + length..];
+    let mut whole = b"glTF\x02\0\0\0".to_vec();
+    whole.extend((20 + json.len() as u32 + rest.len() as u32).to_le_bytes());
+    whole.extend((json.len() as u32).to_le_bytes());
+    whole.extend(b"JSON");
+    whole.extend(json);
+    whole.extend(rest);
+    whole
+}
+
+/// Every required extension was called damage, the harmless ones too.
+#[test]
+fn required_extensions_of_glb_are_passed_or_named_with_advice() {
+    let requiring = |name: &str| {
+        let to = format!(
+            "\"extensionsUsed\":[\"{name}\"],\"extensionsRequired\":[\"{name}\"],\"scene\":0,"
+        );
+        glb_with("\"scene\":0,", &to)
+    };
+    for name in [
+        "KHR_texture_transform",
+        "KHR_texture_basisu",
+        "KHR_materials_unlit",
+        "EXT_texture_webp",
+        "KHR_lights_punctual",
+    ] {
+        let file = read(SurfaceFormat::Glb, &requiring(name)).unwrap();
+        assert_eq!(
+            (file.triangles.len(), file.warnings.len()),
+            (4, 0),
+            "{name}"
+        );
+    }
+    for (name, advice) in [
+        ("KHR_draco_mesh_compression", "without compression"),
+        ("EXT_meshopt_compression", "without compression"),
+        ("KHR_mesh_quantization", "without quantization"),
+        ("EXT_mesh_gpu_instancing", "real objects"),
+        ("VND_other", "plain mesh"),
+    ] {
+        let message = refusal(SurfaceFormat::Glb, &requiring(name));
+        assert!(
+            message.contains(name) && message.contains(advice),
+            "{message}"
+        );
+    }
+    // A texture of `KHR_texture_basisu` names no plain image.
+    let textured = glb_with(
+        "\"scene\":0,",
+        "\"scene\":0,\"textures\":[{\"sampler\":7}],",
+    );
+    assert!(read(SurfaceFormat::Glb, &textured).is_ok());
+}
+
+/// Instances, morph targets and the indices of half a triangle were left out without a word.
+#[test]
+fn geometry_of_glb_that_is_not_read_is_refused_or_a_warning() {
+    let refused = |from: &str, to: &str, reason: &str| {
+        let message = refusal(SurfaceFormat::Glb, &glb_with(from, to));
+        assert!(
+            message.contains(reason) && message.contains("export it again"),
+            "{message}"
+        );
+    };
+    let node = "{\"mesh\":0,";
+    refused(
+        node,
+        "{\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"TRANSLATION\":0}}},",
+        "EXT_mesh_gpu_instancing",
+    );
+    refused("\"count\":9", "\"count\":8", "whole triangles");
+    let morphed = |weight: &str| {
+        let to = format!(
+            "\"meshes\":[{{\"weights\":[{weight}],\"primitives\":[{{\"targets\":[{{\"POSITION\":0}}],"
+        );
+        glb_with("\"meshes\":[{\"primitives\":[{", &to)
+    };
+    let message = refusal(SurfaceFormat::Glb, &morphed("0.3"));
+    assert!(message.contains("morph targets"), "{message}");
+    // At rest nothing is bent.
+    assert!(
+        read(SurfaceFormat::Glb, &morphed("0.0"))
+            .unwrap()
+            .warnings
+            .is_empty()
+    );
+    let hidden = "{\"mesh\":0,\"extensions\":{\"KHR_node_visibility\":{\"visible\":false}},";
+    let file = read(SurfaceFormat::Glb, &glb_with(node, hidden)).unwrap();
+    assert!(
+        file.warnings[0].contains("KHR_node_visibility"),
+        "{:?}",
+        file.warnings
+    );
+}
+
 #[test]
 fn a_glb_file_that_claims_more_than_it_holds_is_refused() {
     let good = glb();
