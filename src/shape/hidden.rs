@@ -6,13 +6,14 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::file_mesh::Triangle;
 use crate::height::{Grid, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
-use crate::point_flags::{self, Rules};
+use crate::point_flags::{self, Rules, contacts, is_closed, is_oriented};
 use crate::surface::Surface;
-use crate::vertical_hit::may_touch;
+use crate::vertical_hit::{Contact, may_touch};
 use fluxform_numerics::axis::Axis;
 use fluxform_numerics::vec3::{cross, dot, minus};
 
@@ -32,7 +33,8 @@ const DEPTH: f64 = 1e-6;
 pub struct Hidden {
     /// Not seen from above: below other parts of the surface, or facing down as a body's underside.
     pub of_area: f64,
-    /// Of the area that faces up, what lies under other parts of the surface: undercuts, hollows.
+    /// Of the area that faces up, what lies under other parts of the surface: undercuts, hollows; 0 where
+    /// facets of an open surface look to different sides, which leaves open what faces up.
     pub of_upward: f64,
 }
 
@@ -63,6 +65,9 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         six_volumes += dot(minus(triangle[0], bounds.min_m), normal);
         ends.push(area);
     }
+    // Where facets of a body look to different sides, the sheets above a point tell inside from outside.
+    let closed = is_closed(triangles);
+    let by_sheets = closed && !is_oriented(triangles);
     // A body whose triangles look inwards is turned inside out.
     let outward = if six_volumes < 0.0 { -1.0 } else { 1.0 };
     let [x_m, y_m] = bounds.plan().map(|[from, to]| Axis {
@@ -105,7 +110,11 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         if normal[2].abs() <= level {
             return [1, 0, 0, 0];
         }
-        let up = usize::from(outward * normal[2] > 0.0);
+        let up = usize::from(if by_sheets {
+            sheets_above(triangles, index.at(p), (facet, point), depth_m, rules).is_multiple_of(2)
+        } else {
+            outward * normal[2] > 0.0
+        });
         [1, usize::from(covered), up, up * usize::from(covered)]
     };
     // Where triangles lie over each other many times, a line meets all of them: fewer lines.
@@ -120,10 +129,39 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         .map(look)
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+    let mut of_upward = share(sums[3], sums[2]);
+    if of_upward > 0.0 && !closed {
+        let reach_m = WELD_ROUNDINGS * mesh.facts().plan_rounding_m;
+        if Edges::new(&weld(triangles, reach_m)).inconsistent > 0 {
+            of_upward = 0.0;
+        }
+    }
     Hidden {
         of_area: share(sums[1], sums[0]),
-        of_upward: share(sums[3], sums[2]),
+        of_upward,
     }
+}
+
+/// How many sheets of the surface lie more than `depth_m` above a `point` on a `facet`.
+fn sheets_above(
+    triangles: &[Triangle],
+    touching: &[u32],
+    (facet, point): (usize, [f64; 3]),
+    depth_m: f64,
+    rules: Rules,
+) -> usize {
+    let above = |(at, contact)| match contact {
+        Contact::Covers(height) if at as usize != facet && height > point[2] + depth_m => {
+            Some(height)
+        }
+        _ => None,
+    };
+    let contacts = contacts(triangles, touching, [point[0], point[1]], rules);
+    let mut heights: Vec<f64> = contacts.filter_map(above).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    // Triangles that meet over the point are one sheet.
+    heights.dedup_by(|a, b| *a - *b <= depth_m);
+    heights.len()
 }
 
 /// Whether anything lies more than `depth_m` above a `point` on a `facet`.
@@ -160,6 +198,10 @@ mod tests {
 
     /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.
     fn turned(outline: &[[f64; 2]]) -> Surface {
+        placed(triangles_of(outline))
+    }
+
+    fn triangles_of(outline: &[[f64; 2]]) -> Vec<Triangle> {
         const SECTORS: usize = 48;
         let at = |[r, z]: [f64; 2], k: usize| {
             let (sin, cos) =
@@ -174,6 +216,10 @@ mod tests {
                 triangles.extend([[p, q, r], [p, r, s]]);
             }
         }
+        triangles
+    }
+
+    fn placed(triangles: Vec<Triangle>) -> Surface {
         let file = FileMesh {
             triangles,
             coordinate_rounding: 6.5e-7,
@@ -210,5 +256,40 @@ mod tests {
         let found = Hidden::of(&mushroom).unwrap();
         let share = (25.0 - 4.0) / (25.0 - 4.0 + 36.0 - 0.01);
         assert!((found.of_upward - share).abs() < 0.01, "{found:?} {share}");
+    }
+
+    /// Facets turned round made half of a box's upper side an undercut.
+    #[test]
+    fn facets_that_look_to_different_sides_hide_no_more() {
+        let mixed = |outline: &[[f64; 2]], closed: bool| {
+            let mut triangles = triangles_of(outline);
+            if !closed {
+                triangles.remove(7);
+            }
+            for triangle in triangles.iter_mut().step_by(2) {
+                triangle.swap(0, 1);
+            }
+            Hidden::of(&placed(triangles)).unwrap()
+        };
+        let washer = [[6.5, 0.0], [6.5, 5.3], [3.35, 5.3], [3.35, 0.0]];
+        let found = mixed(&washer, true);
+        assert!(found.of_upward < 1e-3 && found.of_area > 0.15, "{found:?}");
+        assert_eq!(mixed(&washer, false).of_upward, 0.0);
+        let mushroom = [
+            [5.0, 0.0],
+            [5.0, 1.0],
+            [2.0, 1.0],
+            [2.0, 4.0],
+            [6.0, 4.0],
+            [6.0, 5.0],
+            [0.1, 5.0],
+            [0.1, 0.0],
+        ];
+        let plain = Hidden::of(&turned(&mushroom)).unwrap();
+        let found = mixed(&mushroom, true);
+        assert!(
+            (found.of_upward - plain.of_upward).abs() < 2e-3,
+            "{found:?} {plain:?}"
+        );
     }
 }

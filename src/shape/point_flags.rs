@@ -56,6 +56,16 @@ pub(super) struct Rules {
 ///
 /// Vertices must be equal to the bit; a surface with T-junctions counts as open.
 pub(super) fn is_closed(triangles: &[Triangle]) -> bool {
+    folded_edges(triangles).0 == 0
+}
+
+/// Of a closed surface, whether all triangles look to the same side of it.
+pub(super) fn is_oriented(triangles: &[Triangle]) -> bool {
+    folded_edges(triangles).1 == 0
+}
+
+/// The edges folded, without and with the way that each runs.
+fn folded_edges(triangles: &[Triangle]) -> (u64, u64) {
     let mix = |mut z: u64| {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -67,13 +77,20 @@ pub(super) fn is_closed(triangles: &[Triangle]) -> bool {
             mix(h ^ (c + 0.0).to_bits())
         })
     };
-    let folded = triangles.iter().fold(0, |sum, triangle| {
+    let (mut folded, mut along) = (0, 0u64);
+    for triangle in triangles {
         let [a, b, c] = triangle.map(point);
-        [[a, b], [b, c], [c, a]]
-            .iter()
-            .fold(sum, |sum, [p, q]| sum ^ mix(p.wrapping_add(*q)))
-    });
-    folded == 0
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            let edge = mix(p.wrapping_add(q));
+            folded ^= edge;
+            along = if p < q {
+                along.wrapping_add(edge)
+            } else {
+                along.wrapping_sub(edge)
+            };
+        }
+    }
+    (folded, along)
 }
 
 /// Height and marks over `p`, from every triangle that may touch its vertical line.
@@ -104,7 +121,8 @@ pub(super) fn is_met(triangles: &[Triangle], touching: &[u32], p: [f64; 2], rule
     contacts(triangles, touching, p, rules).next().is_some()
 }
 
-fn contacts(
+/// How the triangles among `touching` touch the vertical line through `p`, where they do.
+pub(super) fn contacts(
     triangles: &[Triangle],
     touching: &[u32],
     p: [f64; 2],
