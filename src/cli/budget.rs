@@ -21,11 +21,18 @@ const LONG_S: f64 = 60.0;
 
 static GRANTED: OnceLock<u64> = OnceLock::new();
 
-/// Grants `--memory`.
+/// Grants `--memory`, and surfaces the same budget: their readers know the number of triangles first.
 pub fn grant(memory: Option<u64>) {
     if let Some(memory) = memory {
         let _ = GRANTED.set(memory);
     }
+    crate::shape::memory::grant(budget() as u64);
+}
+
+/// Bytes that a run may take.
+fn budget() -> f64 {
+    let granted = GRANTED.get();
+    granted.map_or_else(|| SHARE * available_bytes(), |granted| *granted as f64)
 }
 
 /// The origin of an amount of work.
@@ -127,7 +134,7 @@ fn duration(costs: &[Cost], threads: usize) -> Option<String> {
 /// The memory it would take, the memory there is, and what helps.
 fn within(cost: &Cost) -> Result<(), String> {
     let granted = GRANTED.get().copied();
-    let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);
+    let budget = budget();
     if cost.bytes <= budget {
         return Ok(());
     }

@@ -1,6 +1,7 @@
 //! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
 
 use crate::file_mesh::Triangle;
+use crate::memory;
 use crate::number::F32_ROUNDING;
 
 /// Placing bodies several times may add so many triangles to those of the file,
@@ -186,6 +187,7 @@ pub(super) fn lay_out(
              copies of them, or {MOST_PLACEMENTS} placements; export fewer bodies or a coarser mesh"
         ));
     }
+    memory::check(total.triangles)?;
     let read = |body: &Body| {
         let far = farthest(&body.triangles);
         (own(far), far)

@@ -9,6 +9,7 @@ use std::io::Cursor;
 use png::{ColorType, Decoder, Limits, Transformations};
 
 use crate::file_mesh::{FileMesh, Triangle};
+use crate::memory;
 use crate::read_error::ReadError;
 
 /// More pixels than this are more triangles than a computer holds.
@@ -50,6 +51,8 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         let what = "the image claims more pixels than its bytes can hold: it was cut short";
         return Err(ReadError::file(what));
     }
+    let triangles = 2 * u64::from(width - 1) * u64::from(height - 1);
+    memory::check(triangles).map_err(ReadError::file)?;
     let channels = match reader.output_color_type().0 {
         ColorType::Grayscale => 1,
         ColorType::GrayscaleAlpha => 2,

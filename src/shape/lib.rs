@@ -46,6 +46,7 @@ pub mod height_image;
 pub mod hidden;
 pub mod holes;
 pub mod inspect;
+pub mod memory;
 pub mod mesh;
 pub mod obj;
 pub mod off;

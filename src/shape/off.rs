@@ -2,6 +2,7 @@
 //! texture coordinates are passed over. The file carries no unit.
 
 use crate::file_mesh::FileMesh;
+use crate::memory;
 use crate::number::{Numbers, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::{Place, ReadError};
@@ -59,6 +60,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let bytes = narrow(bytes);
     let mut rest = Rest(Lines::new(&bytes));
     let [vertices, faces] = counts(&bytes, &mut rest)?;
+    memory::check(faces as u64).map_err(ReadError::file)?;
     let mut numbers = Numbers::default();
     let mut points = Vec::with_capacity(vertices);
     for _ in 0..vertices {

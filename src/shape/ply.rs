@@ -13,6 +13,7 @@ use ply_rs_bw::ply::{
 };
 
 use crate::file_mesh::FileMesh;
+use crate::memory;
 use crate::number::{F32_ROUNDING, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::ReadError;
@@ -49,6 +50,8 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         .read_header(&mut Reader::new(&mut &header[..]))
         .map_err(fault)?;
     check(&header, body.len())?;
+    let faces = header.elements.get("face").map_or(0, |face| face.count);
+    memory::check(faces as u64).map_err(ReadError::file)?;
     if header.encoding == Encoding::Ascii {
         let body = ascii::read(&header, body, lines)?;
         return mesh(body);

@@ -10,6 +10,7 @@ use crate::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, un
 use crate::error::ShapeError;
 use crate::file_mesh::{Bounds, FileMesh};
 use crate::height::{self, Grid, Sample};
+use crate::memory;
 use crate::mesh::{Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
@@ -261,7 +262,13 @@ pub(super) fn read_mesh(
             path.display()
         )));
     }
-    Ok((format, format.read(path, &bytes)?))
+    let file = format.read(path, &bytes)?;
+    // Where the format states no count, it is known only now: what is made of them takes more.
+    memory::check(file.triangles.len() as u64).map_err(|what| ShapeError::Content {
+        path: path.into(),
+        source: ReadError::file(what),
+    })?;
+    Ok((format, file))
 }
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it

@@ -230,3 +230,42 @@ fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
     );
     assert!(number(&resolved["accuracy"]["quadrature"]["estimate"]) < 2e-3);
 }
+
+/// An image of 15 kB took 4.5 GB under `--memory 1GB`.
+#[test]
+fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {
+    let place = Place::new();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 3000, 3000);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![70; 9_000_000]).unwrap();
+    writer.finish().unwrap();
+    place.write("large.png", &bytes);
+    let args = [
+        "discretize",
+        "large.png",
+        "--unit",
+        "mm",
+        "--out",
+        "-",
+        "--memory",
+        "1GB",
+    ];
+    let ran = place.run(&args).ends(3);
+    for part in ["triangles", "of memory", "--memory", "fewer pixels"] {
+        assert!(ran.err.contains(part), "{part}: {ran:?}");
+    }
+    let small = [
+        "discretize",
+        "shapes/half_sphere.stl",
+        "--unit",
+        "mm",
+        "--out",
+        "-",
+    ];
+    place
+        .run(&[&small[..], &["--memory", "1GB"]].concat())
+        .ends(0);
+}

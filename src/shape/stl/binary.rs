@@ -3,6 +3,7 @@
 use std::io::{self, Read};
 
 use crate::file_mesh::{FileMesh, Triangle};
+use crate::memory;
 use crate::number::F32_ROUNDING;
 use crate::stl::StlError;
 use crate::zeros::Zeros;
@@ -33,6 +34,7 @@ fn requested(count: u32) -> u64 {
 /// Reads bytes whose length fits.
 pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     let records = &bytes[HEADER..];
+    check_memory(records.len() / RECORD)?;
     let mut found = Records::with_capacity(records.len() / RECORD);
     found.add(records);
     found.mesh()
@@ -52,6 +54,9 @@ pub(super) fn read_from(
         return Ok(None);
     };
     let mut left = claimed as usize;
+    if let Err(error) = check_memory(left) {
+        return Ok(Some(Err(error)));
+    }
     let mut zeros = Zeros::default();
     // The count fits the length, but a file may be longer than what was written to it.
     let mut found = Records::with_capacity(left.min(RESERVED));
@@ -68,6 +73,10 @@ pub(super) fn read_from(
         left -= records;
     }
     Ok(Some(found.mesh()))
+}
+
+fn check_memory(triangles: usize) -> Result<(), StlError> {
+    memory::check(triangles as u64).map_err(|what| StlError::Memory { what })
 }
 
 /// Triangles read so far.

@@ -27,6 +27,12 @@ pub(super) enum StlError {
         /// Where, and what to do.
         what: String,
     },
+    /// More triangles than this run may hold.
+    #[error("{what}")]
+    Memory {
+        /// How many, and what to do.
+        what: String,
+    },
     /// Blanks alone.
     #[error("this is not an STL file but blank; the export failed")]
     Blank,
