@@ -23,6 +23,11 @@ use fluxform_numerics::axis::Axis;
 const DEPTHS: std::ops::RangeInclusive<u32> = 2..=4;
 /// Samples at most, if more quarters give more.
 const MOST_SAMPLES: usize = 65_536;
+/// Triangles that the looks at all samples may be compared with, about: some seconds of one core. Where so many
+/// lie over each other that even the fewest samples meet more, cells are left to their corners.
+const MOST_MET: usize = 1 << 26;
+/// Looks that a cell takes at least, about: the corners of its quarters, doubled by every further quartering.
+const LEAST_LOOKS: usize = 9;
 /// Cells that are sampled, at most: those that depart most from their corners.
 const MOST_CELLS: usize = 4096;
 /// A cell of the grid is smooth whose middle departs by less than this share of its height from its corners' mean.
@@ -49,6 +54,8 @@ pub struct Over<'a> {
     pub height_m: &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync),
     /// Whether it has one: that is sooner known.
     pub covers: &'a (dyn Fn([f64; 2]) -> bool + Sync),
+    /// How many triangles a look at it compares the place with.
+    pub near: &'a (dyn Fn([f64; 2]) -> usize + Sync),
 }
 
 /// Cells of a grid whose corners describe the surface badly, sampled on finer places; columns of equal
@@ -126,25 +133,40 @@ fn sampled(
     surface: Over,
     progress: &dyn Progress,
 ) -> Result<Vec<(usize, CellSamples)>, Interrupted> {
+    let middle = |cell: &usize| {
+        let across = grid.x_m.samples - 1;
+        let between = |axis: Axis, node: usize| 0.5 * (axis.node(node) + axis.node(node + 1));
+        [
+            between(grid.x_m, cell % across),
+            between(grid.y_m, cell / across),
+        ]
+    };
+    let near: usize = broken.iter().map(|cell| (surface.near)(middle(cell))).sum();
     for depth in DEPTHS.rev() {
+        // What is sure to be too much is not begun.
+        if (near * LEAST_LOOKS) << (depth - 1) > MOST_MET {
+            continue;
+        }
         let most = if depth > *DEPTHS.start() {
             MOST_SAMPLES
         } else {
             usize::MAX
         };
-        let so_far = AtomicUsize::new(0);
+        let (so_far, met) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let within = || so_far.load(Relaxed) <= most && met.load(Relaxed) <= MOST_MET;
         // `None` where there are too many by then: the cells are divided again.
         let of_cell = |cell: &usize| {
             fluxform_base::progress::poll();
-            (so_far.load(Relaxed) <= most).then(|| {
-                let samples = cell_samples(grid, *cell, depth, surface);
+            within().then(|| {
+                let (samples, triangles) = cell_samples(grid, *cell, depth, surface);
                 so_far.fetch_add(samples.len(), Relaxed);
+                met.fetch_add(triangles, Relaxed);
                 (*cell, samples)
             })
         };
         let all: Option<Vec<_>> = broken.par_iter().map(of_cell).collect();
         progress.check()?;
-        if let Some(all) = all.filter(|_| so_far.into_inner() <= most) {
+        if let Some(all) = all.filter(|_| within()) {
             return Ok(all);
         }
     }
@@ -152,8 +174,8 @@ fn sampled(
 }
 
 /// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
-/// from their corners; none where none has surface.
-fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> CellSamples {
+/// from their corners; none where none has surface. Also how many triangles its looks met.
+fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> (CellSamples, usize) {
     let across = grid.x_m.samples - 1;
     let part = |axis: Axis, node: usize| Axis {
         from: axis.node(node),
@@ -165,17 +187,20 @@ fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> CellSamp
         x_m: part(grid.x_m, cell % across),
         y_m: part(grid.y_m, cell / across),
         surface,
+        met: 0,
         heights_m: BTreeMap::new(),
         ends: BTreeMap::new(),
         fine: Vec::new(),
         coarse: Vec::new(),
     };
     quarters.divide(depth, [0, 0]);
-    let Quarters { fine, coarse, .. } = quarters;
+    let Quarters {
+        fine, coarse, met, ..
+    } = quarters;
     let area = |rule: &[Part]| rule.iter().map(|part| part.area_m2).sum::<f64>();
     let total = area(&fine);
     if total == 0.0 {
-        return Vec::new();
+        return (Vec::new(), met);
     }
     let coarse = if coarse.is_empty() {
         fine.clone()
@@ -193,7 +218,7 @@ fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> CellSamp
         .map(|part| (*part, [part.area_m2, of_coarse(part)]));
     let coarse_alone = coarse.iter().filter(|part| !fine.contains(part));
     let coarse_alone = coarse_alone.map(|part| (*part, [0.0, scale * part.area_m2]));
-    rules.chain(coarse_alone).collect()
+    (rules.chain(coarse_alone).collect(), met)
 }
 
 /// A node of the finest division of a cell, along x and y.
@@ -222,6 +247,8 @@ struct Quarters<'a> {
     x_m: Axis,
     y_m: Axis,
     surface: Over<'a>,
+    /// Triangles that its looks met.
+    met: usize,
     heights_m: BTreeMap<Node, Option<f64>>,
     /// How far the surface goes from a node to the next of a part: two parts have that side.
     ends: BTreeMap<[Node; 2], f64>,
@@ -237,8 +264,17 @@ impl Quarters<'_> {
     }
 
     fn height_m(&mut self, node: Node) -> Option<f64> {
-        let (place, at) = (self.place(node), self.surface.height_m);
-        *self.heights_m.entry(node).or_insert_with(|| at(place))
+        if let Some(known) = self.heights_m.get(&node) {
+            return *known;
+        }
+        let height_m = self.look(self.place(node));
+        self.heights_m.insert(node, height_m);
+        height_m
+    }
+
+    fn look(&mut self, place: [f64; 2]) -> Option<f64> {
+        self.met += (self.surface.near)(place);
+        (self.surface.height_m)(place)
     }
 
     /// Divides the part from the node `first` on, which is quartered `depth` times at most. Returns what stands
@@ -301,9 +337,12 @@ impl Quarters<'_> {
             if present[0] != present[1] {
                 let [has, lacks] = if present[0] { [k, next] } else { [next, k] };
                 let (from, to) = (corners[has], corners[lacks]);
-                let covers = self.surface.covers;
+                let Over { covers, near, .. } = self.surface;
                 let end = self.ends.entry([nodes[has], nodes[lacks]]);
-                let part = end.or_insert_with(|| covered_part(from, to, covers, PART_BISECTIONS));
+                let part = end.or_insert_with(|| {
+                    self.met += PART_BISECTIONS as usize * near(from);
+                    covered_part(from, to, covers, PART_BISECTIONS)
+                });
                 outline.push(along(from, to, *part));
             }
         }
@@ -313,7 +352,7 @@ impl Quarters<'_> {
             present.find_map(|(corner, height_m)| Some((corner, height_m?)))
         };
         // A bay of the silhouette may hold the middle.
-        let found = (self.surface.height_m)(middle).map(|height_m| (middle, height_m));
+        let found = self.look(middle).map(|height_m| (middle, height_m));
         let (at_m, height_m) = found.or_else(at_corner)?;
         Some(Part {
             at_m,
@@ -590,6 +629,7 @@ mod tests {
         let surface = Over {
             height_m: &height_at,
             covers: &|p| height_at(p).is_some(),
+            near: &|_| 1,
         };
         areas_m2(grid, &heights, surface, &Silent).unwrap()
     }
@@ -678,5 +718,34 @@ mod tests {
         assert!(refined < 0.5 * plain, "{plain} {refined}");
         let (_, smooth) = both(&grid([20, 20]), |p| Some(0.05 + 0.1 * p[0]));
         assert_eq!(smooth, FineCells::default());
+    }
+
+    /// Where triangles lie over each other, every look meets all of them: samples took minutes.
+    #[test]
+    fn many_triangles_over_each_other_get_fewer_samples() {
+        let found = |near: usize| {
+            let grid = grid([31, 29]);
+            let disc = |p: [f64; 2]| (p[0].hypot(p[1]) <= 0.0437).then_some(0.05);
+            let heights: Vec<Option<f64>> = (0..grid.len())
+                .map(|k| disc([grid.x_m.node(k % 31), grid.y_m.node(k / 31)]))
+                .collect();
+            let surface = Over {
+                height_m: &disc,
+                covers: &|p| disc(p).is_some(),
+                near: &|_| near,
+            };
+            areas_m2(&grid, &heights, surface, &Silent).unwrap()
+        };
+        let plain = found(1);
+        let samples = |near: usize| found(near).1.x_m.len();
+        assert!(plain.1.x_m.len() > samples(3_000) && samples(3_000) > 0);
+        for near in [3_000, 20_000, 1_000_000] {
+            let crowded = found(near);
+            // The points themselves count as before.
+            assert_eq!(crowded.0, plain.0);
+            assert_eq!(crowded, found(near));
+        }
+        assert_eq!(samples(1_000_000), 0);
+        assert_eq!(found(1_000_000).1.point_area_m2, plain.0);
     }
 }

@@ -456,6 +456,7 @@ fn point_areas_m2(
     let surface = Over {
         height_m: &height_at,
         covers: &|p| probe.covers(p),
+        near: &|p| probe.near(p),
     };
     let (all, mut fine) = areas_m2(&points.grid, &heights_m, surface, progress)?;
     let of_points = |all: &[f64]| points.grid_index.iter().map(|&place| all[place]).collect();
