@@ -375,3 +375,30 @@ fn the_committed_documents_are_toml_of_the_four_shapes() {
         assert_eq!(exact["points"], surface["points"]);
     }
 }
+
+/// Keys of files were passed over without a word, and every chord was taken for metres.
+#[test]
+fn keys_of_files_are_refused_beside_a_primitive_and_a_chord_is_no_metre() {
+    let read = |keys: &str| {
+        let text = format!("name = \"a\"\n{keys}\n");
+        ShapeDocument::from_toml(&text, Path::new("a.toml"))
+    };
+    for key in [
+        "chord_mm = 0.3",
+        "body = \"lid\"",
+        "stretch = true",
+        "scale = 1.3",
+    ] {
+        let invalid = read(&format!("primitive = \"flat\"\n{key}")).unwrap_err();
+        let name = key.split(' ').next().unwrap();
+        let faults = format!("{:?}", invalid.faults);
+        assert!(
+            faults.contains("a primitive has") && faults.contains(name),
+            "{faults}"
+        );
+    }
+    let (document, warnings) = read("surface = \"a.step\"\nchord_mm = 0.01").unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(document.bodies.chord_m, Some(1e-5));
+    assert!(read("surface = \"a.step\"\nchord_mm = 0.0").is_err());
+}

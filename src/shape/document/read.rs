@@ -169,7 +169,22 @@ fn force(root: &mut Section<'_>) -> RequestedForce {
 
 /// How bodies of STEP files are cut into facets, and which.
 fn bodies(root: &mut Section<'_>) -> BodyOptions {
-    let chord = root.number("chord_mm", &BODY_MM.positive());
+    if root.has("primitive") {
+        let unused = ["chord_mm", "body"];
+        for key in unused {
+            if root.has(key) {
+                root.fault(
+                    key,
+                    "a primitive has no facets and no bodies",
+                    "leave the key out",
+                );
+            }
+        }
+        root.ignore(&unused);
+        return BodyOptions::default();
+    }
+    // A chord is far below any body's size: 10 um are no metres.
+    let chord = root.number("chord_mm", &Rule::any("mm").positive());
     BodyOptions {
         chord_m: chord.map(|chord| m_from_mm(chord.value)),
         body: root.text("body").map(|body| body.value),
@@ -294,9 +309,16 @@ fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
             }
         },
     };
-    if root.has("primitive") && root.has("scale") {
+    let of_primitive = ["scale", "stretch"].map(|key| root.has("primitive") && root.has(key));
+    for (key, _) in ["scale", "stretch"]
+        .iter()
+        .zip(of_primitive)
+        .filter(|(_, given)| *given)
+    {
         let message = "a primitive has its own sizes";
-        root.fault("scale", message, "change its sizes instead");
+        root.fault(key, message, "change its sizes instead");
+    }
+    if of_primitive.contains(&true) {
         return None;
     }
     if !stretch && factors.iter().any(|factor| *factor != factors[0]) {
