@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::edges::{Edges, WELD_ROUNDINGS, weld};
-use crate::file_mesh::Triangle;
+use crate::file_mesh::{Bounds, Triangle};
 use crate::height::{Grid, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
@@ -70,15 +70,9 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
     let by_sheets = closed && !is_oriented(triangles);
     // A body whose triangles look inwards is turned inside out.
     let outward = if six_volumes < 0.0 { -1.0 } else { 1.0 };
-    let [x_m, y_m] = bounds.plan().map(|[from, to]| Axis {
-        from,
-        to,
-        samples: if to > from { CELLS } else { 1 },
-    });
-    let grid = Grid { x_m, y_m };
     // Heights alone are requested: of layers nothing.
     let rules = Rules {
-        reach_m: reach_m(mesh, &grid),
+        reach_m: reach_m(mesh, &cells(bounds)),
         plain_layers: 1,
     };
     let index = Index::new(mesh, rules.reach_m);
@@ -89,15 +83,7 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let at = area * (k as f64 + 0.5) / POINTS as f64;
         let first = ends.partition_point(|end| *end < at);
         let facet = first.min(triangles.len() - 1);
-        let [a, b, c] = triangles[facet];
-        // The plastic number's recurrence fills a square evenly; folded, a triangle.
-        let [mut s, mut t] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2]
-            .map(|step: f64| (0.5 + step * k as f64).fract());
-        if s + t > 1.0 {
-            (s, t) = (1.0 - s, 1.0 - t);
-        }
-        let point = [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]));
-        (facet, point)
+        (facet, point_on(triangles[facet], k))
     };
     let look = |k: usize| -> [usize; 4] {
         fluxform_base::progress::poll();
@@ -129,17 +115,43 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         .map(look)
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
-    let mut of_upward = share(sums[3], sums[2]);
-    if of_upward > 0.0 && !closed {
-        let reach_m = WELD_ROUNDINGS * mesh.facts().plan_rounding_m;
-        if Edges::new(&weld(triangles, reach_m)).inconsistent > 0 {
-            of_upward = 0.0;
-        }
-    }
+    let of_upward = share(sums[3], sums[2]);
+    let is_open_what_faces_up = of_upward > 0.0 && !closed && disagrees(mesh);
     Hidden {
         of_area: share(sums[1], sums[0]),
-        of_upward,
+        of_upward: if is_open_what_faces_up {
+            0.0
+        } else {
+            of_upward
+        },
     }
+}
+
+/// The grid over a mesh's bounds.
+fn cells(bounds: Bounds) -> Grid {
+    let [x_m, y_m] = bounds.plan().map(|[from, to]| Axis {
+        from,
+        to,
+        samples: if to > from { CELLS } else { 1 },
+    });
+    Grid { x_m, y_m }
+}
+
+/// Point `k` of a sequence that fills a triangle evenly.
+fn point_on([a, b, c]: Triangle, k: usize) -> [f64; 3] {
+    // The plastic number's recurrence fills a square; folded, a triangle.
+    let [mut s, mut t] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2]
+        .map(|step: f64| (0.5 + step * k as f64).fract());
+    if s + t > 1.0 {
+        (s, t) = (1.0 - s, 1.0 - t);
+    }
+    [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]))
+}
+
+/// Whether neighbouring facets look to different sides.
+fn disagrees(mesh: &Mesh) -> bool {
+    let reach_m = WELD_ROUNDINGS * mesh.facts().plan_rounding_m;
+    Edges::new(&weld(mesh.triangles(), reach_m)).inconsistent > 0
 }
 
 /// How many sheets of the surface lie more than `depth_m` above a `point` on a `facet`.

@@ -72,7 +72,7 @@ impl Given {
 
     fn refused(&self, strands: &[Strand]) -> Contradiction {
         // The nearest below and above of all wires; of equal ones the first.
-        let (mut below, mut above): (Option<(f64, String)>, Option<(f64, String)>) = (None, None);
+        let [mut below, mut above] = [const { None::<(f64, String)> }; 2];
         for strand in strands {
             let less = self.wires(strand).floor();
             for count in [less, less + 1.0] {

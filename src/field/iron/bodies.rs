@@ -408,7 +408,7 @@ pub struct Iron {
     mirrors: [bool; 2],
     largest_m: f64,
     top_m: f64,
-    /// The windings that it is about.
+    /// The windings near which its panels are cut more finely.
     windings: Option<Windings>,
 }
 
@@ -436,7 +436,10 @@ impl Iron {
             parts.push(Part::new(&own)?);
         }
         let mut iron = Self::none();
-        iron.windings = Some(Windings::new(coils.winding, coils.positions_m));
+        // Cores and a plate with marks follow the windings by themselves.
+        let follows = |piece: &Piece| piece.core.is_some() || !piece.marks.is_empty();
+        iron.windings =
+            (!pieces.iter().all(follows)).then(|| Windings::new(coils.winding, coils.positions_m));
         iron.planes_m = middle(coils.positions_m);
         let upright: Option<Vec<&[Prism]>> = parts.iter().map(Part::upright).collect();
         iron.mirrors = [0, 1].map(|axis| {

@@ -32,7 +32,9 @@ pub(super) struct Linkage<'a> {
 }
 
 impl Linkage<'_> {
-    /// Flux through the winding of every drive, -mu_0 int v n.H dS with the winding's own H, H, and by how much the rules differed. Panels are halved until two rules agree: under a winding's end H changes over the gap.
+    /// Flux through the winding of every drive, -mu_0 int v n.H dS with the H of the winding's own current, in henry, and
+    /// by how much the rules differed. Panels are halved until two rules agree: under a winding's end H changes over the
+    /// gap.
     ///
     /// # Errors
     /// A node on the winding's edge.

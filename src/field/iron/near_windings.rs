@@ -32,9 +32,24 @@ impl Windings {
         }
     }
 
+    /// Whether the middle of a panel is in the bore of the winding about `axis_m`, whose field changes little there: a
+    /// core's.
+    fn is_in_bore(&self, panel: &Panel, axis_m: [f64; 2]) -> bool {
+        let [x, y, z] = panel.centre_m;
+        let Winding {
+            inner_radius_m,
+            length_m,
+            ..
+        } = self.winding;
+        (x - axis_m[0]).hypot(y - axis_m[1]) < inner_radius_m && (-length_m..0.0).contains(&z)
+    }
+
     /// Adds `panel` of `face` to `out`, halved as long as it is too large for its distance.
     pub(super) fn add_halved(&self, panel: Panel, face: &Face, out: &mut Vec<Panel>) {
-        let from = |axis: &[f64; 2]| from_section_m(&panel, &self.winding, *axis);
+        let from = |axis: &[f64; 2]| match self.is_in_bore(&panel, *axis) {
+            true => f64::INFINITY,
+            false => from_section_m(&panel, &self.winding, *axis),
+        };
         let distance_m = self
             .positions_m
             .iter()
