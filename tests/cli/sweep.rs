@@ -174,8 +174,8 @@ fn a_row_has_the_limits_and_the_settling_time_of_evaluate() {
             let reported = place.run(&["evaluate", "one.toml", "--format", "json"]);
             let reported = reported.ends(0).json();
             let limits = &reported["limits"];
-            let all = limits.as_object().unwrap().values();
-            let all_met = all.fold(true, |all, limit| all && limit["met"] == true);
+            let mut all = limits.as_object().unwrap().values();
+            let all_met = all.all(|limit| limit["met"] == true);
             let row: Value = serde_json::from_slice(&place.read(&point("p", 0))).unwrap();
             assert_eq!(row["row"]["limits_met"], all_met, "{most_ms} {limits}");
             assert_eq!(row["row"]["settling_s"], limits["settling_s"]["value"]);

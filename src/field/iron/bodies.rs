@@ -5,23 +5,13 @@ use std::sync::Arc;
 use super::arrangement;
 use super::face::{Face, Point, Resolution, SAME_M};
 use super::mesh_body::MeshBody;
-use super::near_windings::Windings;
 pub use super::plate::{Fault, Outline, Plate};
 pub use super::prisms::Contact;
 use super::prisms::{self, Prism, connected, is_mirrored};
 pub use super::round_faces::Site;
-use super::surface::Surface;
 use crate::steel::CoreShape;
 use crate::winding::Winding;
 use fluxform_numerics::vec3::{dot, minus};
-
-/// Resolutions from coarse to fine: order, and steps to an edge. The order grows from each to the next, so that no panel
-/// is as in the one before, by which the error is estimated.
-pub const RESOLUTIONS: [(usize, i32); 6] = [(3, 1), (4, 2), (5, 2), (6, 3), (7, 4), (8, 6)];
-/// Panels about a whole turn.
-const PER_TURN: usize = 4;
-/// Panels along the largest body, away from windings.
-const ALONG: f64 = 4.0;
 
 /// A body's shape about its middle.
 #[derive(Debug, Clone, PartialEq)]
@@ -408,8 +398,6 @@ pub struct Iron {
     mirrors: [bool; 2],
     largest_m: f64,
     top_m: f64,
-    /// The windings near which its panels are cut more finely.
-    windings: Option<Windings>,
 }
 
 impl Iron {
@@ -436,10 +424,6 @@ impl Iron {
             parts.push(Part::new(&own)?);
         }
         let mut iron = Self::none();
-        // Cores and a plate with marks follow the windings by themselves.
-        let follows = |piece: &Piece| piece.core.is_some() || !piece.marks.is_empty();
-        iron.windings =
-            (!pieces.iter().all(follows)).then(|| Windings::new(coils.winding, coils.positions_m));
         iron.planes_m = middle(coils.positions_m);
         let upright: Option<Vec<&[Prism]>> = parts.iter().map(Part::upright).collect();
         iron.mirrors = [0, 1].map(|axis| {
@@ -470,7 +454,6 @@ impl Iron {
             mirrors: [false; 2],
             largest_m: 0.0,
             top_m: f64::NEG_INFINITY,
-            windings: None,
         }
     }
 
@@ -559,16 +542,16 @@ impl Iron {
         self.top_m
     }
 
-    /// Its mirrored part at one of the [`RESOLUTIONS`].
-    pub(super) fn surface(&self, tier: usize) -> Surface {
-        let (order, levels) = RESOLUTIONS[tier];
-        let resolution = Resolution {
+    pub(super) fn resolution(
+        &self,
+        (order, per_turn, levels, along): (usize, usize, i32, f64),
+    ) -> Resolution {
+        Resolution {
             order,
-            per_turn: PER_TURN,
+            per_turn,
             levels,
-            panel_m: self.largest_m / ALONG,
-        };
-        Surface::new(self.part(), &resolution, self.windings.as_ref())
+            panel_m: self.largest_m / along,
+        }
     }
 }
 
