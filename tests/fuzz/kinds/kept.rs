@@ -24,7 +24,7 @@ pub fn kind() -> Kind {
 const ENTRY: &str = "flat.points";
 /// The magic, the digest of the origin, the digest of the value.
 const HEAD: usize = 8 + 2 * 32;
-/// The digest of the origin, which depends on the folder too: zeros in an input stand for the right one.
+/// The digest of the origin, which depends on the folder and the entry's name too: zeros in an input stand for the right one.
 const ORIGIN: std::ops::Range<usize> = 8..40;
 
 /// The two forms of an entry: as the forces are, and as solutions hold them.
@@ -103,10 +103,12 @@ fn hostile() -> Vec<(String, Input)> {
 fn adopt(input: &Input, store: &Store, folder: &Path) {
     let zeros = |bytes: &&[u8]| bytes.get(ORIGIN).is_some_and(|o| o.iter().all(|b| *b == 0));
     if let Some(mut bytes) = input.get(ENTRY).filter(zeros).map(<[u8]>::to_vec) {
-        store.keep("own", &origin(), &());
-        let own = std::fs::read(folder.join("own")).expect("an entry");
+        let path = folder.join(ENTRY);
+        std::fs::remove_file(&path).expect("its own file");
+        store.keep(ENTRY, &origin(), &());
+        let own = std::fs::read(&path).expect("an entry");
         bytes[ORIGIN].copy_from_slice(&own[ORIGIN]);
-        std::fs::write(folder.join(ENTRY), bytes).expect("writable");
+        std::fs::write(path, bytes).expect("writable");
     }
 }
 
