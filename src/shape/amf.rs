@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::archive::{Archive, text_of};
-use crate::assembly::{Affine, Body, LaidOut, corner, lay_out};
+use crate::assembly::{Affine, Body, Fineness, corner, lay_out};
 use crate::document::parse_unit;
 use crate::file_mesh::FileMesh;
 use crate::number::Numbers;
@@ -182,17 +182,8 @@ impl Reader {
             .filter(|k| !is_child[*k])
             .map(|k| (k, Affine::IDENTITY))
             .collect();
-        let numbers = &self.numbers;
-        let LaidOut {
-            triangles,
-            coordinate_rounding,
-        } = lay_out(
-            &self.bodies,
-            &roots,
-            |_| numbers.rounding(),
-            numbers.epsilon(),
-        )?;
-        if triangles.is_empty() {
+        let laid_out = lay_out(&self.bodies, &roots, Fineness::Printed(&self.numbers))?;
+        if laid_out.triangles.is_empty() {
             return Err("the AMF file holds no triangle: export a body".into());
         }
         let unit = self.unit.unwrap_or_else(|| "millimeter".into());
@@ -219,11 +210,9 @@ impl Reader {
             ));
         }
         Ok(FileMesh {
-            triangles,
-            coordinate_rounding,
             unit_m: Some(unit_m),
             warnings,
-            ..FileMesh::default()
+            ..laid_out
         })
     }
 }

@@ -1,8 +1,8 @@
 //! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
 
-use crate::file_mesh::Triangle;
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::memory;
-use crate::number::F32_ROUNDING;
+use crate::number::{F32_ROUNDING, Numbers};
 
 /// Placing bodies several times may add so many triangles to those of the file,
 const MOST_ADDED: u64 = 10_000_000;
@@ -152,25 +152,47 @@ pub(super) fn corner(vertices: &[[f64; 3]], index: usize) -> Result<[f64; 3], St
     })
 }
 
-/// What [`lay_out`] makes of an assembly.
-#[derive(Debug, Default, PartialEq)]
-pub(super) struct LaidOut {
-    pub(super) triangles: Vec<Triangle>,
-    /// How far a coordinate may lie from what was meant: what cancels in a placement leaves its rounding.
-    pub(super) coordinate_rounding: f64,
+/// How finely a file gives its numbers.
+#[derive(Clone, Copy)]
+pub(super) enum Fineness<'a> {
+    /// As doubles; what else they are off is measured.
+    Doubles,
+    /// As floats.
+    Floats,
+    /// As text.
+    Printed(&'a Numbers),
 }
 
-/// Lays out `roots`: every triangle of the bodies below, placed. `own` states the rounding of a body's
-/// coordinates, of which these are the largest along each axis; `epsilon` is that of placements, relative.
+impl Fineness<'_> {
+    /// The rounding of coordinates of which these are the largest along each axis.
+    pub(super) fn rounding(self, far: [f64; 3]) -> f64 {
+        match self {
+            Self::Doubles => 0.0,
+            Self::Floats => far[0].max(far[1]).max(far[2]) * F32_ROUNDING,
+            Self::Printed(numbers) => numbers.rounding(),
+        }
+    }
+
+    /// The rounding of a placement's numbers, relative.
+    fn epsilon(self) -> f64 {
+        match self {
+            Self::Doubles => 0.0,
+            Self::Floats => F32_ROUNDING,
+            Self::Printed(numbers) => numbers.epsilon(),
+        }
+    }
+}
+
+/// Lays out `roots`: every triangle of the bodies below, placed, and how far its coordinates may lie from
+/// what was meant: what cancels in a placement leaves its rounding.
 ///
 /// # Errors
 /// A body within itself, too many triangles, bodies nested too deep.
 pub(super) fn lay_out(
     bodies: &[Body],
     roots: &[(usize, Affine)],
-    own: impl Fn([f64; 3]) -> f64,
-    epsilon: f64,
-) -> Result<LaidOut, String> {
+    fineness: Fineness<'_>,
+) -> Result<FileMesh, String> {
     let mut visits = vec![None; bodies.len()];
     // Bodies within themselves are a fault of the file also where nothing places them.
     for body in 0..bodies.len() {
@@ -190,16 +212,17 @@ pub(super) fn lay_out(
     memory::check(total.triangles)?;
     let read = |body: &Body| {
         let far = farthest(&body.triangles);
-        (own(far), far)
+        (fineness.rounding(far), far)
     };
+    let epsilon = fineness.epsilon();
     let assembly = Assembly {
         bodies,
         read: bodies.iter().map(read).collect(),
         epsilon,
     };
-    let mut laid_out = LaidOut {
+    let mut laid_out = FileMesh {
         triangles: Vec::with_capacity(usize::try_from(total.triangles).unwrap_or(0)),
-        ..LaidOut::default()
+        ..FileMesh::default()
     };
     for (root, place) in roots {
         assembly.add(*root, &Placed::new(*place, epsilon), &mut laid_out);
@@ -209,11 +232,6 @@ pub(super) fn lay_out(
         return Err("a placement moves a body beyond all numbers".into());
     }
     Ok(laid_out)
-}
-
-/// The rounding of coordinates stored as f32, of which these are the largest along each axis.
-pub(super) fn floats_rounding(far: [f64; 3]) -> f64 {
-    far[0].max(far[1]).max(far[2]) * F32_ROUNDING
 }
 
 /// The largest magnitude along each axis.
@@ -294,7 +312,7 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
-    fn add(&self, index: usize, placed: &Placed, laid_out: &mut LaidOut) {
+    fn add(&self, index: usize, placed: &Placed, laid_out: &mut FileMesh) {
         let (body, place) = (&self.bodies[index], &placed.place);
         let triangles = &mut laid_out.triangles;
         if *place == Affine::IDENTITY {
@@ -318,13 +336,8 @@ impl Assembly<'_> {
 mod tests {
     use super::*;
 
-    fn of(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<LaidOut, String> {
-        lay_out(
-            bodies,
-            roots,
-            |far| 1e-3 * far[0].max(far[1]).max(far[2]),
-            1e-3,
-        )
+    fn of(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<FileMesh, String> {
+        lay_out(bodies, roots, Fineness::Floats)
     }
 
     /// Numbers that cancelled took their roundings along: of a part read far away nothing was stated.
@@ -339,11 +352,11 @@ mod tests {
             ..Affine::IDENTITY
         };
         let rounding = |bodies: &[Body], root, place| {
-            of(bodies, &[(root, place)]).unwrap().coordinate_rounding
+            of(bodies, &[(root, place)]).unwrap().coordinate_rounding / F32_ROUNDING
         };
         let still = [body.clone()];
-        assert_eq!(rounding(&still, 0, Affine::IDENTITY), 3.0);
-        assert_eq!(rounding(&still, 0, shifted(-3000.0)), 6.0);
+        assert_eq!(rounding(&still, 0, Affine::IDENTITY), 3000.0);
+        assert_eq!(rounding(&still, 0, shifted(-3000.0)), 6000.0);
         // Two shifts that undo each other, the inner one enlarged; and a turn, whose numbers are rounded too.
         let nested = [
             Body {
@@ -356,13 +369,13 @@ mod tests {
             rows: [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]],
             ..shifted(70.0)
         };
-        assert!((rounding(&nested, 0, twice) - 12.07).abs() < 1e-12);
+        assert_eq!(rounding(&nested, 0, twice), 12_070.0);
         let turned = Affine {
             rows: [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]],
             ..shifted(0.0)
         };
         let found = rounding(&still, 0, turned);
-        assert!((found - (1.4 * 3.0 + 3.0007)).abs() < 1e-12, "{found}");
+        assert!((found - (1.4 * 3000.0 + 3000.7)).abs() < 1e-9, "{found}");
     }
 
     #[test]
@@ -426,7 +439,7 @@ mod tests {
             },
         ];
         let mut roots = vec![(1, Affine::IDENTITY); 1000];
-        assert_eq!(of(&bodies, &roots), Ok(LaidOut::default()));
+        assert_eq!(of(&bodies, &roots), Ok(FileMesh::default()));
         roots.push((0, Affine::IDENTITY));
         assert!(of(&bodies, &roots).unwrap_err().contains("placements"));
     }

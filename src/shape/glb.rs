@@ -12,9 +12,8 @@ use gltf::mesh::Mode;
 use gltf::{Document, Node, Semantic};
 use serde_json::Value;
 
-use crate::assembly::{Affine, Body, LaidOut, corner, floats_rounding, lay_out};
+use crate::assembly::{Affine, Body, Fineness, corner, lay_out};
 use crate::file_mesh::{FileMesh, Triangle};
-use crate::number::F32_ROUNDING;
 use crate::read_error::ReadError;
 
 /// glTF's y upwards becomes z.
@@ -84,20 +83,15 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         .nodes()
         .map(|node| (meshes + node.index(), UPWARDS))
         .collect();
-    let LaidOut {
-        triangles,
-        coordinate_rounding,
-    } = lay_out(&bodies, &roots, floats_rounding, F32_ROUNDING).map_err(ReadError::file)?;
-    if triangles.is_empty() {
+    let laid_out = lay_out(&bodies, &roots, Fineness::Floats).map_err(ReadError::file)?;
+    if laid_out.triangles.is_empty() {
         let what = "the GLB file's scene holds no triangle: export a body as a mesh";
         return Err(ReadError::file(what));
     }
     Ok(FileMesh {
-        triangles,
-        coordinate_rounding,
         unit_m: Some(1.0),
         warnings,
-        ..FileMesh::default()
+        ..laid_out
     })
 }
 

@@ -116,14 +116,10 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
     let of_upward = share(sums[3], sums[2]);
-    let is_open_what_faces_up = of_upward > 0.0 && !closed && disagrees(mesh);
+    let unknown = of_upward > 0.0 && !closed && disagrees(mesh);
     Hidden {
         of_area: share(sums[1], sums[0]),
-        of_upward: if is_open_what_faces_up {
-            0.0
-        } else {
-            of_upward
-        },
+        of_upward: if unknown { 0.0 } else { of_upward },
     }
 }
 

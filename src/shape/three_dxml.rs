@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use crate::archive::Archive;
-use crate::assembly::{Affine, Body, LaidOut, corner, lay_out};
+use crate::assembly::{Affine, Body, Fineness, corner, lay_out};
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::Numbers;
 use crate::read_error::{Place, ReadError};
@@ -149,20 +149,15 @@ impl Structure {
             .and_then(|id| index.get(&id).copied())
             .ok_or_else(|| fault("the product has no root reference".into()))?;
         let roots = [(root, Affine::IDENTITY)];
-        let LaidOut {
-            triangles,
-            coordinate_rounding,
-        } = lay_out(&bodies, &roots, |_| numbers.rounding(), numbers.epsilon()).map_err(fault)?;
-        if triangles.is_empty() {
+        let laid_out = lay_out(&bodies, &roots, Fineness::Printed(&numbers)).map_err(fault)?;
+        if laid_out.triangles.is_empty() {
             let what =
                 "the 3DXML file holds no tessellated triangle; export the body as 3MF or STL";
             return Err(fault(what.into()));
         }
         Ok(FileMesh {
-            triangles,
-            coordinate_rounding,
             unit_m: Some(1e-3),
-            ..FileMesh::default()
+            ..laid_out
         })
     }
 }

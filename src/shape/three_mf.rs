@@ -7,7 +7,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::archive::Archive;
-use crate::assembly::{Affine, Body, LaidOut, corner, counts, lay_out};
+use crate::assembly::{Affine, Body, Fineness, corner, counts, lay_out};
 use crate::bodies::NamedBody;
 use crate::document::parse_unit;
 use crate::file_mesh::FileMesh;
@@ -242,18 +242,9 @@ impl Model {
             let what = "the 3MF file builds nothing: its `build` has no item; export it again";
             return Err(fault(what.into()));
         }
-        let numbers = &self.numbers;
-        let LaidOut {
-            triangles,
-            coordinate_rounding,
-        } = lay_out(
-            &self.bodies,
-            &roots,
-            |_| numbers.rounding(),
-            numbers.epsilon(),
-        )
-        .map_err(fault)?;
-        if triangles.is_empty() {
+        let laid_out =
+            lay_out(&self.bodies, &roots, Fineness::Printed(&self.numbers)).map_err(fault)?;
+        if laid_out.triangles.is_empty() {
             let what = "the 3MF file's build has no triangle: export a body as a mesh";
             return Err(fault(what.into()));
         }
@@ -281,12 +272,10 @@ impl Model {
             ));
         }
         Ok(FileMesh {
-            triangles,
-            coordinate_rounding,
             unit_m: Some(unit_m),
             bodies: named.collect(),
             warnings,
-            ..FileMesh::default()
+            ..laid_out
         })
     }
 

@@ -350,7 +350,7 @@ fn dimensions_can_be_fixed() {
 }
 
 #[test]
-fn arguments_of_another_search_were_ignored() {
+fn arguments_of_another_search_are_refused() {
     let place = Place::new();
     for (args, named) in [
         (

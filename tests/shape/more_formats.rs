@@ -127,7 +127,7 @@ fn ply_and_off_are_read_in_every_encoding_and_with_every_end_of_line() {
     );
 }
 
-/// Faces beyond the header's count were left out without a word, and what is no number was called no element.
+/// Faces beyond the header's count were left out without a word, and the message for `nan` was that a line could not be read.
 #[test]
 fn what_a_ply_or_off_header_leaves_out_is_a_warning() {
     use SurfaceFormat::{Off, Ply};

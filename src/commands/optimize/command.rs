@@ -60,9 +60,14 @@ pub struct Optimize {
     /// Keep these dimensions of the design's [coil]
     #[arg(long, hide_short_help = true, value_name = "KEY", value_parser = values::named::<Dimension>(), num_args = 1.., value_delimiter = ',')]
     fix: Vec<Dimension>,
-    /// Boxes of coils that proving the best may take; 0 for no proof [default: 4000000]
-    #[arg(long, hide_short_help = true, value_name = "N")]
-    certificate_cells: Option<usize>,
+    /// Boxes of coils that proving the best may take; 0 for no proof
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "N",
+        default_value_t = OptimizeRequest::default().cells
+    )]
+    certificate_cells: usize,
     /// Write the design with the best coil here (TOML); `-` is standard output
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
@@ -184,7 +189,10 @@ impl Optimize {
             (self.wound, "--wound"),
             (self.neighbours, "--neighbours"),
             (!self.fix.is_empty(), "--fix"),
-            (self.certificate_cells.is_some(), "--certificate-cells"),
+            (
+                self.certificate_cells != OptimizeRequest::default().cells,
+                "--certificate-cells",
+            ),
         ];
         let given: Vec<&str> = of_one_coil
             .into_iter()
@@ -226,14 +234,13 @@ impl Optimize {
     }
 
     fn request(&self) -> OptimizeRequest {
-        let default = OptimizeRequest::default();
         OptimizeRequest {
             wound: self.wound,
             neighbours: self.neighbours,
             fixed: self.fix.clone(),
-            starts: self.starts.unwrap_or(default.starts),
+            starts: self.starts.unwrap_or(OptimizeRequest::default().starts),
             seed: self.seed,
-            cells: self.certificate_cells.unwrap_or(default.cells),
+            cells: self.certificate_cells,
             around: true,
             landscape: self.array.plot.is_some(),
             tolerance: self.tolerance.tolerance,

@@ -277,7 +277,7 @@ impl<'a> Verifier<'a> {
     ) -> Result<Option<Arc<Expected>>, RunError> {
         let Some(shape) = &sources.shape else {
             all.unchecked.push(format!(
-                "points, requested directions, what is derived from the force constant or stated for \
+                "points, requested directions, lambda's path and what follows from lambda, the setting for \
                  uncertainties, pages, plots, texts and stated errors: {}",
                 sources.without_shape()
             ));

@@ -108,17 +108,26 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     })
 }
 
+/// Whether the shape is a primitive: then `keys`, which it does not take, are at fault.
+fn of_primitive(root: &mut Section<'_>, keys: &[&'static str], message: &str, help: &str) -> bool {
+    if !root.has("primitive") {
+        return false;
+    }
+    for key in keys.iter().filter(|key| root.has(key)) {
+        root.fault(key, message, help);
+    }
+    root.ignore(keys);
+    true
+}
+
 /// Where the surface goes by its own box.
 fn seat(root: &mut Section<'_>) -> Seat {
-    const KEYS: [&str; 5] = ["up", "center", "rest_on_mm", "fit_mm", "scale_to_fit"];
-    if root.has("primitive") {
-        for key in KEYS {
-            if root.has(key) {
-                let message = "a primitive lies where its base is";
-                root.fault(key, message, "use base_mm, height_mm or translate_mm");
-            }
-        }
-        root.ignore(&KEYS);
+    let (message, help) = (
+        "a primitive lies where its base is",
+        "use base_mm, height_mm or translate_mm",
+    );
+    let keys = ["up", "center", "rest_on_mm", "fit_mm", "scale_to_fit"];
+    if of_primitive(root, &keys, message, help) {
         return Seat::default();
     }
     let up = root.choice::<Up>("up").unwrap_or_default();
@@ -169,18 +178,8 @@ fn force(root: &mut Section<'_>) -> RequestedForce {
 
 /// How bodies of STEP files are cut into facets, and which.
 fn bodies(root: &mut Section<'_>) -> BodyOptions {
-    if root.has("primitive") {
-        let unused = ["chord_mm", "body"];
-        for key in unused {
-            if root.has(key) {
-                root.fault(
-                    key,
-                    "a primitive has no facets and no bodies",
-                    "leave the key out",
-                );
-            }
-        }
-        root.ignore(&unused);
+    let message = "a primitive has no facets and no bodies";
+    if of_primitive(root, &["chord_mm", "body"], message, "leave the key out") {
         return BodyOptions::default();
     }
     // A chord is far below any body's size: 10 um are no metres.
@@ -293,6 +292,10 @@ const MEANINGS: &[(&str, &str)] = &[
 
 /// Factors of size; `None` where they are at fault.
 fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
+    let (message, help) = ("a primitive has its own sizes", "change its sizes instead");
+    if of_primitive(root, &["scale", "stretch"], message, help) {
+        return Some([1.0; 3]);
+    }
     let rule = Rule::any("").bound(Bound::Positive);
     let stretch = root.flag_or("stretch", false);
     let factors = match root.one_or_many("scale", &rule, 1.0).value {
@@ -309,18 +312,6 @@ fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
             }
         },
     };
-    let of_primitive = ["scale", "stretch"].map(|key| root.has("primitive") && root.has(key));
-    for (key, _) in ["scale", "stretch"]
-        .iter()
-        .zip(of_primitive)
-        .filter(|(_, given)| *given)
-    {
-        let message = "a primitive has its own sizes";
-        root.fault(key, message, "change its sizes instead");
-    }
-    if of_primitive.contains(&true) {
-        return None;
-    }
     if !stretch && factors.iter().any(|factor| *factor != factors[0]) {
         let message = "different factors change the surface's form";
         root.fault("scale", message, "add stretch = true if that is meant");

@@ -16,7 +16,7 @@ use self::container::Blocks;
 use self::display::Table;
 use self::product::Product;
 use crate::archive::text_of;
-use crate::assembly::{LaidOut, farthest, floats_rounding};
+use crate::assembly::{Fineness, farthest};
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::{Place, ReadError};
 use crate::tessellation::face_deviation;
@@ -90,19 +90,16 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
          face); compare with a STEP, STL or 3MF file of the same part",
         deviation * 1000.0
     )];
-    let LaidOut {
-        triangles,
-        coordinate_rounding,
-    } = match product {
+    let laid_out = match product {
         None => {
             let mut triangles = Vec::new();
             for table in &tables {
                 table.read(&stream, &mut triangles)?;
             }
-            let coordinate_rounding = floats_rounding(farthest(&triangles));
-            LaidOut {
+            FileMesh {
+                coordinate_rounding: Fineness::Floats.rounding(farthest(&triangles)),
                 triangles,
-                coordinate_rounding,
+                ..FileMesh::default()
             }
         }
         Some(product) => {
@@ -115,19 +112,17 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
             laid_out
         }
     };
-    if triangles.is_empty() {
+    if laid_out.triangles.is_empty() {
         let what = format!("every component of the assembly is hidden or suppressed: {ADVICE}");
         return Err(ReadError::file(what));
     }
     Ok(FileMesh {
-        triangles,
-        coordinate_rounding,
         unit_m: Some(1.0),
         // Of plane faces nothing but the rounding is left.
-        deviation: deviation.max(coordinate_rounding),
+        deviation: deviation.max(laid_out.coordinate_rounding),
         deviation_is_known: false,
         warnings,
-        ..FileMesh::default()
+        ..laid_out
     })
 }
 

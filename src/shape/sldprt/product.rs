@@ -9,9 +9,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::display::Table;
 use super::{ADVICE, box_of};
-use crate::assembly::{Affine, Body, LaidOut, floats_rounding, lay_out};
-use crate::file_mesh::Triangle;
-use crate::number::F32_ROUNDING;
+use crate::assembly::{Affine, Body, Fineness, lay_out};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::ReadError;
 use crate::xml::{Document, Element, Step};
 
@@ -105,7 +104,7 @@ impl Product {
         &self,
         stream: &[u8],
         tables: &[Table],
-    ) -> Result<(LaidOut, usize), ReadError> {
+    ) -> Result<(FileMesh, usize), ReadError> {
         let index: HashMap<&str, usize> = (self.models.iter().enumerate())
             .map(|(k, model)| (model.id.as_str(), k))
             .collect();
@@ -143,8 +142,7 @@ impl Product {
             return Err(ReadError::file(lacks(&missing, all.count())));
         }
         let roots = [(root, Affine::IDENTITY)];
-        let laid_out =
-            lay_out(&bodies, &roots, floats_rounding, F32_ROUNDING).map_err(ReadError::file)?;
+        let laid_out = lay_out(&bodies, &roots, Fineness::Floats).map_err(ReadError::file)?;
         Ok((laid_out, hidden))
     }
 

@@ -9,7 +9,7 @@ mod kernel;
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::assembly::{Affine, Body, LaidOut, lay_out};
+use crate::assembly::{Affine, Body, Fineness, lay_out};
 use crate::bodies::{BodyOptions, NamedBody};
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::ReadError;
@@ -91,7 +91,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         })
         .collect();
     // How far its corners may lie from the exact body is measured, not inferred.
-    let LaidOut { triangles, .. } = lay_out(&placed, &roots, |_| 0.0, 0.0)?;
+    let FileMesh { triangles, .. } = lay_out(&placed, &roots, Fineness::Doubles)?;
     let named = bodies.into_iter().map(|body| NamedBody {
         triangles: placed[body.part].triangles.len(),
         name: body.name,
