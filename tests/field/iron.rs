@@ -185,7 +185,7 @@ fn a_plate_joins_the_cores_and_closes_the_flux() {
     );
     let nine = coils(&positions_m, 999.0);
     let iron = Iron::new(nine, Some(&joined)).unwrap();
-    let array = IronArray::at_resolution(nine, &iron, 1e-3, 0).unwrap();
+    let array = IronArray::at_resolution(nine, &iron, 1e-3, 1).unwrap();
     let sources = array.sources(0.03, 0.03, 1e-5);
     let oracle = oracle("plate");
     let elements = &oracle["meshes"]["best"];

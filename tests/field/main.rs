@@ -7,6 +7,7 @@ mod iron;
 mod iron_bodies;
 mod iron_closed_forms;
 mod iron_joined;
+mod iron_large;
 mod iron_passive;
 mod magnet;
 mod passive;

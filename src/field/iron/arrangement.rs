@@ -736,7 +736,7 @@ mod tests {
                 levels: 1,
                 panel_m: 0.4,
             };
-            let surface = Surface::new(faces, &resolution);
+            let surface = Surface::new(faces, &resolution, None);
             let mut inside = 0;
             for k in 0..1500 {
                 let [u, v, w] =

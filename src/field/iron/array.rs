@@ -4,8 +4,11 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::axial_profile::AxialProfile;
+pub use super::bodies::RESOLUTIONS;
 use super::bodies::{Coils, Iron};
 use super::face::{Node, Point, SAME_M};
+use super::inductance::{Linkage, least_h};
 use super::parts::Halvings;
 use super::potential::Branch;
 use super::surface::{Surface, mirrored};
@@ -14,19 +17,8 @@ use crate::components::Components;
 use crate::frame::to_cartesian;
 use crate::steel::equivalent_dipoles::ArraySources;
 use crate::winding::{OnEdge, Winding};
-use fluxform_base::units::MU_0_T_M_PER_A;
-use fluxform_numerics::vec3::{dot, minus, norm};
+use fluxform_numerics::vec3::{minus, norm};
 
-/// Resolutions from coarse to fine: order, panels a turn, steps to an edge, panels along the largest
-/// body.
-pub const RESOLUTIONS: [(usize, usize, i32, f64); 6] = [
-    (3, 4, 1, 5.0),
-    (3, 4, 2, 6.0),
-    (4, 4, 2, 7.0),
-    (4, 4, 3, 8.0),
-    (5, 6, 4, 9.0),
-    (6, 8, 6, 12.0),
-];
 /// Most entries of the matrices as they are held (1.6 GB).
 pub(super) const MOST_ENTRIES: usize = 200_000_000;
 /// Most entries that are computed.
@@ -36,6 +28,8 @@ const MOST_COMPUTED: usize = 3 * MOST_ENTRIES;
 pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
+/// Share of the tolerance given to the integration of inductances.
+const FLUX_SHARE: f64 = 0.2;
 /// Steps from the best node to the largest |B|.
 const CLIMBS: usize = 12;
 /// Places, one after the other along the surface, that share the parts of panels close to them.
@@ -70,8 +64,7 @@ fn gigabytes(entries: usize) -> f64 {
 /// The finest of the [`RESOLUTIONS`] that memory allows, the second at least.
 fn finest(iron: &Iron) -> Result<usize, Unsolved> {
     let images = iron.images().len();
-    let unknowns =
-        |tier: usize| Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier])).size();
+    let unknowns = |tier: usize| iron.surface(tier).size();
     let fits = |tier: &usize| images * unknowns(*tier).pow(2) <= MOST_COMPUTED;
     let finest = (1..RESOLUTIONS.len()).take_while(fits).last();
     finest.ok_or_else(|| Unsolved::TooLarge {
@@ -101,8 +94,10 @@ pub struct IronArray {
     top_m: f64,
     /// Steel's part of self and mutual inductances, [coil, drive], H.
     pub added_inductance_h: DMatrix<f64>,
+    /// By how much rules of its integration differed, H.
+    flux_error_h: f64,
     /// Estimated error of gradients and inductances, relative to the largest: the difference from the next
-    /// coarser resolution.
+    /// coarser resolution, with what the linear solver leaves.
     pub relative_error: f64,
     /// Relative residual of the linear solver.
     pub relative_residual: f64,
@@ -164,9 +159,8 @@ impl IronArray {
         tolerance: f64,
         tier: usize,
     ) -> Result<Self, Unsolved> {
-        let resolution = iron.resolution(RESOLUTIONS[tier]);
         let positions_m = coils.positions_m;
-        let surface = Surface::new(iron.part(), &resolution);
+        let surface = iron.surface(tier);
         let images = iron.images();
         let planes_m = iron.planes_m;
         let system = System::new(iron, &surface, &images, tolerance, MOST_ENTRIES);
@@ -213,41 +207,43 @@ impl IronArray {
             layers,
             top_m: iron.top_m(),
             added_inductance_h: DMatrix::zeros(count, count),
+            flux_error_h: 0.0,
             relative_error: f64::NAN,
             relative_residual: solved.residual,
             iterations: solved.iterations,
             coarser: None,
         };
-        array.add_inductances(&firsts)?;
+        array.add_inductances(&firsts, tolerance)?;
         Ok(array)
     }
 
-    /// Flux through coil i: -mu_0 int v n.H_i dS.
-    fn add_inductances(&mut self, firsts: &[usize]) -> Result<(), OnEdge> {
+    /// Sets the inductances that the layers add, and their error by quadrature, which is a share of `tolerance`.
+    fn add_inductances(&mut self, firsts: &[usize], tolerance: f64) -> Result<(), OnEdge> {
         let count = self.positions_m.len();
+        let allowed = FLUX_SHARE * tolerance / self.images.len() as f64;
+        let profiles = AxialProfile::of(self.surface.panels(), &self.winding)?;
         for coil in firsts {
-            let [x, y] = self.positions_m[*coil];
             let mut row = vec![0.0; count];
-            for (image, layers) in self.layers.iter().enumerate() {
-                let fluxes = self
-                    .surface
-                    .nodes
-                    .par_iter()
-                    .map(|node| {
-                        let node = mirrored(node, self.images[image], self.planes_m);
-                        let [px, py, pz] = node.place_m;
-                        let (dx, dy) = (px - x, py - y);
-                        let field = self.winding.field(dx.hypot(dy), pz)?;
-                        let b = to_cartesian(&field, dx, dy).field_t_per_a;
-                        Ok(dot(b, node.area_m2))
-                    })
-                    .collect::<Result<Vec<f64>, OnEdge>>()?;
-                for (layer, flux) in layers.chunks_exact(count).zip(fluxes) {
-                    for (sum, layer) in row.iter_mut().zip(layer) {
-                        *sum -= layer * flux;
-                    }
+            let mut error_h = 0.0;
+            for (signs, layers) in self.images.iter().zip(&self.layers) {
+                let linkage = Linkage {
+                    surface: &self.surface,
+                    winding: &self.winding,
+                    profiles: &profiles,
+                    axis_m: self.positions_m[*coil],
+                    signs: *signs,
+                    planes_m: self.planes_m,
+                    layers,
+                    drives: count,
+                    allowed,
+                };
+                let (fluxes, error) = linkage.fluxes_h()?;
+                for (sum, flux) in row.iter_mut().zip(fluxes) {
+                    *sum += flux;
                 }
+                error_h += error;
             }
+            self.flux_error_h = self.flux_error_h.max(error_h);
             for (drive, value) in row.into_iter().enumerate() {
                 for signs in &self.images {
                     let of = |drive| moved(&self.positions_m, drive, *signs, self.planes_m);
@@ -283,9 +279,11 @@ impl IronArray {
             worst = worst.max(most / size);
         }
         let added = &self.added_inductance_h;
-        let least = 0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m;
-        let size = added.amax().max(least);
-        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+        let size = added.amax().max(least_h(&self.winding));
+        let apart_h = (added - &other.added_inductance_h).amax() + self.flux_error_h;
+        // Both are solved to this residual, so their difference need not show it.
+        let solver = self.relative_residual.max(SOLVER_SHARE * tolerance);
+        Ok(worst.max(apart_h / size) + solver)
     }
 
     /// Number of unknowns of one mirrored part.

@@ -5,13 +5,28 @@ use std::sync::Arc;
 use super::arrangement;
 use super::face::{Face, Point, Resolution, SAME_M};
 use super::mesh_body::MeshBody;
+use super::near_windings::Windings;
 pub use super::plate::{Fault, Outline, Plate};
 pub use super::prisms::Contact;
 use super::prisms::{self, Prism, connected, is_mirrored};
 pub use super::round_faces::Site;
+use super::surface::Surface;
 use crate::steel::CoreShape;
 use crate::winding::Winding;
 use fluxform_numerics::vec3::{dot, minus};
+
+/// Resolutions from coarse to fine: order, steps to an edge, and panels along the largest body away from windings. The
+/// order grows from each to the next, so that no panel is as in the one before, by which the error is estimated.
+pub const RESOLUTIONS: [(usize, i32, f64); 6] = [
+    (2, 1, 5.0),
+    (3, 2, 6.0),
+    (4, 2, 7.0),
+    (5, 3, 8.0),
+    (6, 4, 9.0),
+    (7, 6, 12.0),
+];
+/// Panels about a whole turn.
+const PER_TURN: usize = 4;
 
 /// A body's shape about its middle.
 #[derive(Debug, Clone, PartialEq)]
@@ -398,6 +413,8 @@ pub struct Iron {
     mirrors: [bool; 2],
     largest_m: f64,
     top_m: f64,
+    /// The windings near which panels are cut more finely.
+    windings: Option<Windings>,
 }
 
 impl Iron {
@@ -424,6 +441,7 @@ impl Iron {
             parts.push(Part::new(&own)?);
         }
         let mut iron = Self::none();
+        iron.windings = Some(Windings::new(coils.winding, coils.positions_m));
         iron.planes_m = middle(coils.positions_m);
         let upright: Option<Vec<&[Prism]>> = parts.iter().map(Part::upright).collect();
         iron.mirrors = [0, 1].map(|axis| {
@@ -454,6 +472,7 @@ impl Iron {
             mirrors: [false; 2],
             largest_m: 0.0,
             top_m: f64::NEG_INFINITY,
+            windings: None,
         }
     }
 
@@ -542,16 +561,16 @@ impl Iron {
         self.top_m
     }
 
-    pub(super) fn resolution(
-        &self,
-        (order, per_turn, levels, along): (usize, usize, i32, f64),
-    ) -> Resolution {
-        Resolution {
+    /// Its mirrored part at one of the [`RESOLUTIONS`].
+    pub(super) fn surface(&self, tier: usize) -> Surface {
+        let (order, levels, along) = RESOLUTIONS[tier];
+        let resolution = Resolution {
             order,
-            per_turn,
+            per_turn: PER_TURN,
             levels,
             panel_m: self.largest_m / along,
-        }
+        };
+        Surface::new(self.part(), &resolution, self.windings.as_ref())
     }
 }
 

@@ -199,9 +199,7 @@ impl Face {
         if !self.facet || self.edges.contains(&true) || u.max(v) > resolution.panel_m {
             return resolution.order;
         }
-        // Every one of the resolutions has more than the one before, by which its error is estimated.
-        let least = (resolution.order + resolution.levels as usize).saturating_sub(3);
-        least.clamp(1, resolution.order)
+        (resolution.order - 1).max(1)
     }
 
     /// Its normal reversed: the surface of a cavity.

@@ -13,11 +13,14 @@
 
 mod arrangement;
 pub mod array;
+mod axial_profile;
 mod blocks;
 pub mod bodies;
 pub mod clearance;
 pub mod face;
+mod inductance;
 pub mod mesh_body;
+mod near_windings;
 mod parts;
 pub mod passive;
 pub mod plate;

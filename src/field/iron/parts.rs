@@ -81,8 +81,10 @@ impl<'a> Parts<'a> {
             }
         } else {
             let (whole, part) = (self.parts[0].panel, &mut self.parts[number]);
-            let rule = (part.rule)
-                .get_or_insert_with(|| Rule::new(self.face, self.basis, &whole, &part.panel));
+            let rule = (part.rule).get_or_insert_with(|| {
+                let order = whole.order + MORE_NODES;
+                Rule::new(self.face, self.basis, &whole, &part.panel, order)
+            });
             visit(rule);
         }
     }
@@ -111,8 +113,14 @@ impl Part {
 }
 
 impl Rule {
-    fn new(face: &Face, basis: &Basis, whole: &Panel, part: &Panel) -> Self {
-        let order = whole.order + MORE_NODES;
+    /// That of `order` nodes along each side of `part` of `whole`.
+    pub(super) fn new(
+        face: &Face,
+        basis: &Basis,
+        whole: &Panel,
+        part: &Panel,
+        order: usize,
+    ) -> Self {
         let values = |side: usize| {
             let (lo, hi) = (whole.range[2 * side], whole.range[2 * side + 1]);
             let (from, to) = (part.range[2 * side], part.range[2 * side + 1]);

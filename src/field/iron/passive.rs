@@ -19,7 +19,7 @@ use crate::steel::passive::reaction::{Dipole, Induced};
 use fluxform_numerics::vec3::{dot, minus, norm};
 
 /// Least part of the difference from the coarsest solution that counts as error: neighbours among the
-/// [`RESOLUTIONS`] with as many panels a turn agree with each other ten times better than they are.
+/// [`RESOLUTIONS`] cut the faces alike away from edges, and may agree better than they are.
 const LEAST_SHARE: f64 = 0.1;
 /// Differences are known to be as much too small, between cores where their pulls nearly cancel.
 const SAFETY: f64 = 2.0;
@@ -38,7 +38,7 @@ struct Answer {
 impl Answer {
     /// `None` where the equations have no solution.
     fn new(iron: &Iron, tier: usize) -> Option<Self> {
-        let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
+        let surface = iron.surface(tier);
         let images = iron.images();
         let system = System::new(iron, &surface, &images, 0.0, usize::MAX)
             .ok()?
@@ -121,7 +121,7 @@ impl IronPull {
         let images = iron.images().len();
         // Entries and their factors are held at once.
         let fits = |tier: &usize| {
-            let size = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[*tier])).size();
+            let size = iron.surface(*tier).size();
             2 * images * size.pow(2) <= MOST_ENTRIES
         };
         let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);

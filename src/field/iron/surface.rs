@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
+use super::near_windings::Windings;
 use super::parts::{Halvings, Parts};
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -13,7 +14,7 @@ use fluxform_numerics::lagrange_basis::Basis;
 use fluxform_numerics::vec3::{dot, minus, norm};
 
 /// Distance in half sides from which on a panel's own nodes integrate the kernel.
-const FAR: f64 = 3.0;
+pub(super) const FAR: f64 = 3.0;
 /// Most nodes along a panel's side.
 const MOST_ORDER: usize = 16;
 /// Length of the panels of dipoles relative to their distance.
@@ -37,12 +38,25 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// `faces` cut as `resolution` asks for.
+    /// `faces` cut as `resolution` asks for, and more finely near `windings`.
     #[must_use]
-    pub fn new(faces: Vec<Face>, resolution: &Resolution) -> Self {
-        let panels: Vec<Panel> = (faces.iter().enumerate())
-            .flat_map(|(number, face)| face.panels(number, resolution))
-            .collect();
+    pub(super) fn new(
+        faces: Vec<Face>,
+        resolution: &Resolution,
+        windings: Option<&Windings>,
+    ) -> Self {
+        let mut panels: Vec<Panel> = Vec::new();
+        for (number, face) in faces.iter().enumerate() {
+            for panel in face.panels(number, resolution) {
+                match windings {
+                    // Cores are as small as their windings by themselves.
+                    Some(windings) if face.bore.is_none() => {
+                        windings.add_halved(panel, face, &mut panels);
+                    }
+                    _ => panels.push(panel),
+                }
+            }
+        }
         let (mut nodes, mut firsts, mut panel_of) = (Vec::new(), Vec::new(), Vec::new());
         for (number, panel) in panels.iter().enumerate() {
             firsts.push(nodes.len());
@@ -132,9 +146,14 @@ impl Surface {
     }
 
     /// The parts of a panel: none yet.
-    pub(super) fn parts_of(&self, panel: usize) -> Parts<'_> {
-        let panel = &self.panels[panel];
-        Parts::new(&self.faces[panel.face], &self.bases[panel.order - 1], panel)
+    pub(super) fn parts_of(&self, number: usize) -> Parts<'_> {
+        let panel = &self.panels[number];
+        Parts::new(&self.faces[panel.face], self.basis_of(number), panel)
+    }
+
+    /// The basis on the nodes along a side of a panel.
+    pub(super) fn basis_of(&self, panel: usize) -> &Basis {
+        &self.bases[self.panels[panel].order - 1]
     }
 
     /// B of the layer `values`, one per node, at a place off the surface, T.

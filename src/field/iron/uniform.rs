@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::array::RESOLUTIONS;
 use super::bodies::Iron;
 use super::face::{Face, Point};
 use super::surface::Surface;
@@ -24,7 +23,7 @@ pub struct InUniformField {
 
 impl InUniformField {
     /// Solves `bodies`, each with its relative permeability less one, in a field along the unit vector
-    /// `direction`, at one of the [`RESOLUTIONS`].
+    /// `direction`, at one of the [resolutions](super::bodies::RESOLUTIONS).
     #[must_use]
     pub fn new(bodies: &[(Vec<Face>, f64)], direction: Point, tier: usize) -> Self {
         let mut iron = Iron::none();
@@ -37,7 +36,7 @@ impl InUniformField {
     /// The same of `iron`, which is not mirrored.
     #[must_use]
     pub fn of(iron: Iron, direction: Point, tier: usize) -> Self {
-        let surface = Surface::new(iron.part(), &iron.resolution(RESOLUTIONS[tier]));
+        let surface = iron.surface(tier);
         let system = System::new(&iron, &surface, &[[1.0, 1.0]], 0.0, usize::MAX);
         let system = system.expect("there is no limit");
         let potential = surface

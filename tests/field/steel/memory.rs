@@ -94,7 +94,7 @@ fn held(cases: &[(usize, f64)]) {
 #[test]
 #[cfg(target_os = "linux")]
 fn memory_is_what_was_stated() {
-    held(&[(6, 1e-2), (6, 1e-3), (12, 1e-2)]);
+    held(&[(6, 1e-2), (6, 1e-3), (9, 1e-2)]);
 }
 
 /// `cargo test --release --test field steel -- --ignored --nocapture memory_of_hundreds` prints the table.
