@@ -16,7 +16,7 @@ use fluxform::shape::point_areas::{FineCells, Over, areas_m2};
 /// Finer along each axis for the limit.
 const FINER: usize = 8;
 /// Objects of each kind.
-const OBJECTS: usize = 25;
+const OBJECTS: usize = 12;
 /// Half the side of the plan, m.
 const HALF_M: f64 = 0.05;
 

@@ -65,19 +65,14 @@ fn a_point_s_value_does_not_depend_on_the_other_rows() {
             if !coupling.is_empty() {
                 design.array.coupling = fluxform::design::Coupling::None;
             }
-            for tolerance in [1e-2, 1e-4, 1e-6] {
+            for tolerance in [1e-2, 1e-4] {
                 for force in [false, true] {
                     let points: Vec<[f64; 3]> = points
                         .into_iter()
                         .filter(|p| !force || p[2] > 0.0139)
                         .collect();
                     let all = rows(&table(&design, &points, tolerance, force), columns);
-                    for (point, row) in
-                        points
-                            .iter()
-                            .zip(&all)
-                            .step_by(if tolerance < 1e-3 { 3 } else { 1 })
-                    {
+                    for (point, row) in points.iter().zip(&all) {
                         let alone = rows(&table(&design, &[*point], tolerance, force), columns);
                         assert_eq!(&alone[0], row, "{core} {tolerance:e}");
                     }
@@ -102,7 +97,7 @@ fn a_coarse_probe_near_the_steel_is_within_its_claim() {
         };
         let points: Vec<[f64; 3]> = places.iter().map(|[x, y, z]| [*x, *y, z + top_m]).collect();
         let design = design(core, 1, "");
-        let tight = table(&design, &points, 1e-9, false);
+        let tight = table(&design, &points, 1e-8, false);
         for tolerance in [1e-2, 1e-4, 1e-6] {
             let coarse = table(&design, &points, tolerance, false);
             assert!(
@@ -162,7 +157,7 @@ fn the_claimed_error_of_a_force_over_cores_covers_it_without_the_weights() {
         [0.013, -0.004, 0.041],
     ];
     println!("core, coupling, tolerance: claimed, true, true / claimed");
-    for (columns, coupling, loose, tight) in [(1, "", 1e-4, 1e-7), (2, "full", 1e-4, 1e-6)] {
+    for (columns, coupling, loose, tight) in [(1, "", 1e-4, 1e-6), (2, "full", 1e-4, 1e-5)] {
         for core in [FLUSH, RECESSED] {
             let design = design(
                 core,
