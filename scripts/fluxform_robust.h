@@ -125,16 +125,21 @@ static double sum_of_all(const double *currents, size_t n)
 /* The least value within the box and the limit of the sum, from currents within both. */
 static void least_expected_error(expected_error *p, double total, double *currents, double *within)
 {
-    double low = 0, high = 0, sum;
+    double low = 0, high = DBL_MIN, sum;
     within_box(p, 0, currents);
     if (sum_of_all(currents, p->n) <= total * (1 + SUM_MET))
         return;
-    /* No current flows where the multiplier outweighs every pull. */
+    /* Where coils push against each other the multiplier may have to outweigh more than their pulls. */
     for (size_t i = 0; i < p->n; i++) {
-        high = p->linear[i] > high ? p->linear[i] : high;
+        high = fmax(fabs(p->linear[i]), high);
         within[i] = 0;
     }
     within_box(p, high, within);
+    while (sum_of_all(within, p->n) > total) {
+        low = high;
+        high *= 2;
+        within_box(p, high, within);
+    }
     for (int round = 0; round < SUM_ROUNDS; round++) {
         double middle = 0.5 * (low + high);
         within_box(p, middle, currents);

@@ -295,10 +295,15 @@ function currents = least_expected_error(form, total, currents)
     if sum(currents) <= total * (1 + 1e-12)
         return
     end
-    % No current flows where the multiplier outweighs every pull.
+    % Where coils push against each other the multiplier may have to outweigh more than their pulls.
     low = 0;
-    high = max([0; form.linear]);
+    high = max([realmin; abs(form.linear)]);
     within = within_box(form, high, zeros(size(currents)));
+    while sum(within) > total
+        low = high;
+        high = 2 * high;
+        within = within_box(form, high, within);
+    end
     for round = 1:80
         middle = 0.5 * (low + high);
         currents = within_box(form, middle, currents);

@@ -234,6 +234,12 @@ fn forces_on_samples(other: Option<&Loader>) {
             true,
             [13, 9, 11],
         ),
+        (
+            "upright uncertain with pull, reversing, a small sum",
+            false,
+            true,
+            [13, 17, 11],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("bundle");
@@ -246,6 +252,10 @@ fn forces_on_samples(other: Option<&Loader>) {
         }
         if name.contains("uncertain") {
             sample = sample.with_uncertainty(if pulled { 0.004 } else { 0.0 });
+        }
+        // Broke: currents chosen for uncertainties had a larger sum.
+        if name.contains("small sum") {
+            sample = sample.reversing(Some(0.4));
         }
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
@@ -280,6 +290,9 @@ fn forces_on_samples(other: Option<&Loader>) {
                     let step = robust.step(p, &mut currents);
                     force.extend(step.sideways.map_or([0.0; 2], |sideways| sideways.force_n));
                     force.push(step.force_n);
+                    let sum: f64 = currents.iter().sum();
+                    let most = bundle.map.runtime.total_current_max_a.unwrap();
+                    assert!(sum <= most * (1.0 + 1e-11), "{name}: {sum} A");
                     force.extend(currents);
                 }
                 force

@@ -68,8 +68,8 @@ const LIMITS: ForceProblem = ForceProblem {
 };
 
 /// The least value over every state of the coils: at a limit or free, the sum free or at its limit.
-fn least_of_all_states(matrix: &DMatrix<f64>, linear: &DVector<f64>, total: Option<f64>) -> f64 {
-    let n = AXES_M.len();
+fn least_of_all_states(limits: &ForceProblem, matrix: &DMatrix<f64>, linear: &DVector<f64>) -> f64 {
+    let (n, total) = (limits.coils(), limits.total_max_a);
     let mut least = f64::INFINITY;
     for state in 0..3_usize.pow(n as u32) * 2 {
         let bound_sum = state % 2 == 1;
@@ -79,9 +79,9 @@ fn least_of_all_states(matrix: &DMatrix<f64>, linear: &DVector<f64>, total: Opti
         }
         let free: Vec<usize> = (0..n).filter(|i| of(*i) == 1).collect();
         let mut currents = DVector::from_fn(n, |i, _| match of(i) {
-            0 => LIMITS.lower_a[i],
+            0 => limits.lower_a[i],
             1 => 0.0,
-            _ => LIMITS.upper_a[i],
+            _ => limits.upper_a[i],
         });
         let size = free.len() + usize::from(bound_sum);
         let right = linear - matrix * &currents;
@@ -112,7 +112,7 @@ fn least_of_all_states(matrix: &DMatrix<f64>, linear: &DVector<f64>, total: Opti
             currents[i] = solved[a];
         }
         let within = |i: usize| {
-            currents[i] >= LIMITS.lower_a[i] - 1e-12 && currents[i] <= LIMITS.upper_a[i] + 1e-12
+            currents[i] >= limits.lower_a[i] - 1e-12 && currents[i] <= limits.upper_a[i] + 1e-12
         };
         if (0..n).all(within) && total.is_none_or(|total| currents.sum() <= total + 1e-12) {
             least = least.min(currents.dot(&(matrix * &currents)) - 2.0 * linear.dot(&currents));
@@ -193,7 +193,7 @@ fn robust_currents_are_the_best_of_all_states_of_the_coils() {
         );
         let found = DVector::from_vec(currents.clone());
         let value = found.dot(&(&matrix * &found)) - 2.0 * linear.dot(&found);
-        let least = least_of_all_states(&matrix, &linear, total);
+        let least = least_of_all_states(&limits, &matrix, &linear);
         assert!(
             total.is_none_or(|total| found.sum() <= total * (1.0 + 1e-11)),
             "case {case}"
@@ -203,6 +203,75 @@ fn robust_currents_are_the_best_of_all_states_of_the_coils() {
             "case {case}: {value} {least} {currents:?}"
         );
     }
+}
+
+/// Broke: where coils of unequal force push against each other, the multiplier of the sum was sought below the largest
+/// pull, and currents beyond the limit of the sum were chosen.
+#[test]
+fn the_sum_of_robust_currents_holds_where_coils_push_against_each_other() {
+    let mut random = Random::new(29);
+    let given = Uncertainty {
+        sensor_m: 0.0,
+        tilt_deg: 0.0,
+        heat_c: 0.0,
+        driver: 0.03,
+    };
+    let moments = given.moments();
+    let mut bound = 0;
+    for case in 0..200 {
+        let n = 2 + case % 4;
+        let upper: Vec<f64> = (0..n).map(|_| random.between(0.3, 2.0)).collect();
+        let lower: Vec<f64> = upper.iter().map(|u| -u * random.unit()).collect();
+        let total = random.between(0.0, 0.3);
+        let limits = ForceProblem {
+            lower_a: &lower,
+            upper_a: &upper,
+            total_max_a: Some(total),
+            resistance_ohm: &vec![6.0; n],
+            ..LIMITS
+        };
+        let price = random.decades(1e-9, 1e-6);
+        let (mut matrix, mut linear) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let request = random.between(0.0, 0.5);
+        let places: Vec<Vec<Turned>> = (0..n)
+            .map(|_| {
+                let mut upward = || {
+                    let sign = if random.unit() < 0.4 { -1.0 } else { 1.0 };
+                    sign * random.decades(1e-3, 1.0)
+                };
+                let row = DVector::from_fn(n, |_, _| upward());
+                let weight = 1.0 / n as f64;
+                matrix += &row * row.transpose() * weight;
+                for i in 0..n {
+                    matrix[(i, i)] += weight * moments.driver_square * row[i] * row[i];
+                }
+                linear += &row * (weight * request);
+                let of_coil = |g: &f64| [0.0, 0.0, *g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+                row.iter().map(of_coil).collect()
+            })
+            .collect();
+        for i in 0..n {
+            matrix[(i, i)] += price * 6.0;
+        }
+        let around = places.iter().map(|field| (&field[..], 0.0, 1.0 / n as f64));
+        let wanted = ([0.0, 0.0, request], false);
+        let mut currents = vec![0.0; n];
+        robust_currents(&limits, &given, wanted, around, price, &mut currents);
+        let found = DVector::from_vec(currents);
+        let sum = found.sum();
+        assert!(
+            sum <= total * (1.0 + 1e-11),
+            "case {case}: {sum} of {total} A"
+        );
+        let value = found.dot(&(&matrix * &found)) - 2.0 * linear.dot(&found);
+        let least = least_of_all_states(&limits, &matrix, &linear);
+        assert!(
+            (value - least).abs() <= 1e-9 * least.abs(),
+            "case {case}: {value} {least} {found:?}"
+        );
+        bound += usize::from(sum >= total * (1.0 - 1e-9));
+    }
+    assert!(bound > 40, "{bound}");
 }
 
 /// A bent surface under the given uncertainties.

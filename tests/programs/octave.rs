@@ -98,6 +98,12 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         ("tilted vector with pull", true, true, [13, 9, 11]),
         ("upright uncertain with pull", false, true, [13, 17, 11]),
         (
+            "upright uncertain, reversing, a small sum",
+            false,
+            true,
+            [13, 17, 11],
+        ),
+        (
             "tilted vector, uncertain with pull",
             true,
             true,
@@ -116,6 +122,9 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         }
         if name.contains("uncertain") {
             sample = sample.with_uncertainty(0.004);
+        }
+        if name.contains("small sum") {
+            sample = sample.reversing(Some(0.4));
         }
         let target = folder.path().join("bundle");
         sample.write(&target, false).unwrap();

@@ -342,6 +342,16 @@ impl Sample {
         self
     }
 
+    /// The sample of a bundle whose drivers reverse and whose currents sum to `total_a` at most.
+    pub fn reversing(mut self, total_a: Option<f64>) -> Self {
+        let (runtime, limits) = (&mut self.map.runtime, &mut self.manifest.limits);
+        runtime.current_min_a = runtime.current_max_a.iter().map(|most| -most).collect();
+        limits.current_min_a = runtime.current_min_a.clone();
+        runtime.total_current_max_a = total_a;
+        limits.total_current_max_a = total_a;
+        self
+    }
+
     /// The sample of a bundle of schema 1.1: without what position feedback needs.
     pub fn without_rendering(mut self) -> Self {
         self.map.runtime.rendering = None;

@@ -117,10 +117,17 @@ impl ErrorForm {
         if sum(currents_a) <= total * (1.0 + SUM_MET) {
             return;
         }
-        // No current flows where the multiplier outweighs every pull.
-        let (mut low, mut high) = (0.0, self.linear.iter().fold(0.0_f64, |m, b| m.max(*b)));
+        // Where coils push against each other the multiplier may have to outweigh more than their pulls; the sum
+        // falls with it, at last to that of the lower limits, which is within.
+        let pulls = self.linear.iter().map(|b| b.abs());
+        let (mut low, mut high) = (0.0, pulls.fold(f64::MIN_POSITIVE, f64::max));
         let mut within = vec![0.0; self.coils];
         search.within_box(high, &mut within);
+        while sum(&within) > total {
+            low = high;
+            high *= 2.0;
+            search.within_box(high, &mut within);
+        }
         for _ in 0..ROUNDS {
             let middle = 0.5 * (low + high);
             search.within_box(middle, currents_a);

@@ -67,9 +67,12 @@ class ExpectedError:
         currents = self.within_box(0.0, currents.copy())
         if np.sum(currents) <= total * (1 + SUM_MET):
             return currents
-        # No current flows where the multiplier outweighs every pull.
-        low, high = 0.0, np.max(self.linear, initial=0.0)
+        # Where coils push against each other the multiplier may have to outweigh more than their pulls.
+        low, high = 0.0, np.max(np.abs(self.linear), initial=np.finfo(float).tiny)
         within = self.within_box(high, np.zeros(len(currents)))
+        while np.sum(within) > total:
+            low, high = high, 2 * high
+            within = self.within_box(high, within)
         for _ in range(SUM_ROUNDS):
             middle = 0.5 * (low + high)
             currents = self.within_box(middle, currents)
