@@ -68,9 +68,10 @@ impl Wiring {
     }
 
     /// The problem's lists with these changes. The first coil of a pair stands for both; the
-    /// second one, like a broken coil, is left without force and current.
+    /// second one, like a broken coil, is left without force and current. A pair is one circuit: a
+    /// supply of `voltage_v` drives it at most by that over the sum of both resistances.
     #[must_use]
-    pub fn apply(&self, problem: &ForceProblem) -> Rewired {
+    pub fn apply(&self, problem: &ForceProblem, voltage_v: Option<f64>) -> Rewired {
         let mut changed = Rewired {
             forces_n_per_a: problem.forces_n_per_a.to_vec(),
             lower_a: problem.lower_a.to_vec(),
@@ -78,9 +79,10 @@ impl Wiring {
             resistance_ohm: problem.resistance_ohm.to_vec(),
         };
         for &[a, b] in &self.series {
-            changed.lower_a[a] = changed.lower_a[a].max(changed.lower_a[b]);
-            changed.upper_a[a] = changed.upper_a[a].min(changed.upper_a[b]);
             changed.resistance_ohm[a] += changed.resistance_ohm[b];
+            let most_a = voltage_v.map_or(f64::INFINITY, |v| v / changed.resistance_ohm[a]);
+            changed.lower_a[a] = changed.lower_a[a].max(changed.lower_a[b]).max(-most_a);
+            changed.upper_a[a] = changed.upper_a[a].min(changed.upper_a[b]).min(most_a);
         }
         for row in changed.forces_n_per_a.chunks_exact_mut(problem.coils()) {
             for &[a, b] in &self.series {

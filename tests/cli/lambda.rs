@@ -90,6 +90,44 @@ fn variants_are_listed_beside_the_design_as_given() {
     assert_eq!(pair["wiring"]["series"][0][1], 8);
 }
 
+/// Broke: each coil of a pair was given the current that the supply drives through one of them.
+#[test]
+fn the_supply_drives_a_pair_through_both_resistances() {
+    let place = Place::new();
+    let weak = std::fs::read_to_string(fluxform_testing::root().join(AIR)).expect("a design");
+    place.write(
+        "weak.toml",
+        &weak.replace("voltage_v = 36.0", "voltage_v = 9.0"),
+    );
+    let largest = |flags: &[&str]| {
+        let command = [&["lambda", "weak.toml", WEDGE, "--format", "json"], flags].concat();
+        let reported = place.run(&command).ends(0).json();
+        let chosen = match reported["variants"].as_array() {
+            None => reported.clone(),
+            Some(all) => (all.iter())
+                .find(|v| v["name"] == "0+8 in series")
+                .expect("that pair")
+                .clone(),
+        };
+        let currents = chosen["currents_a"].as_array().expect("currents").clone();
+        let [pair, all] = [&currents[..1], &currents[..]].map(|some| {
+            some.iter()
+                .map(|i| i.as_f64().unwrap().abs())
+                .fold(0.0, f64::max)
+        });
+        (pair, all)
+    };
+    let criterion = ["--criterion", "saturation"];
+    let (_, alone) = largest(&criterion);
+    for flags in [&["--series", "0+8"][..], &["--variants"]] {
+        let (pair, all) = largest(&[flags, &criterion].concat());
+        assert!(
+            pair <= 0.5 * alone * (1.0 + 1e-9) && all > 0.9 * alone,
+            "{pair} {all} {alone}"
+        );
+    }
+}
+
 /// Lifted points were once solved with all coils, and compared with a lambda without some.
 #[test]
 fn the_effect_of_the_points_is_that_of_the_wired_coils() {

@@ -220,11 +220,16 @@ fn broken_coils_and_pairs_are_the_problems_without_and_with_sums() {
             })
             .collect();
         let keep = |list: &[f64], first: f64| [&[first], &list[3..]].concat();
-        by_hand.lower = keep(&case.lower, case.lower[0].max(case.lower[2]));
-        by_hand.upper = keep(&case.upper, case.upper[0].min(case.upper[2]));
-        by_hand.ohm = keep(&case.ohm, case.ohm[0] + case.ohm[2]);
+        let ohm = case.ohm[0] + case.ohm[2];
+        // A supply that drives the first coil beyond its limit, but not the pair.
+        let voltage_v = (seed % 2 == 0).then_some(0.7 * case.upper[0] * ohm);
+        let most = voltage_v.map_or(f64::INFINITY, |volt| volt / ohm);
+        let keep_lower = case.lower[0].max(case.lower[2]).max(-most);
+        by_hand.lower = keep(&case.lower, keep_lower);
+        by_hand.upper = keep(&case.upper, case.upper[0].min(case.upper[2]).min(most));
+        by_hand.ohm = keep(&case.ohm, ohm);
         let problem = case.problem();
-        let rewired = wiring.apply(&problem);
+        let rewired = wiring.apply(&problem, voltage_v);
         let wired = rewired.problem(&problem);
         let (a, b) = (
             solve(&wired, &settings).expect("well formed"),

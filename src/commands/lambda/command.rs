@@ -100,6 +100,8 @@ struct WiringFlags {
     )]
     broken: Vec<usize>,
     /// Pairs of coils that carry one current, like 0+8,2+6
+    ///
+    /// A pair is one circuit: the supply's voltage drives it through both resistances.
     #[arg(long, hide_short_help = true, value_name = "PAIRS", value_delimiter = ',', value_parser = values::pair)]
     series: Vec<[usize; 2]>,
     /// Also solve with one change at a time

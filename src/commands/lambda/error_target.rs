@@ -127,7 +127,7 @@ impl Trial<'_> {
             total_max_a: scene.design.supply.total_current_max_a,
             resistance_ohm: &resistance_ohm,
         };
-        let rewired = options.wiring.apply(&unwired);
+        let rewired = (options.wiring).apply(&unwired, scene.design.supply.voltage_v);
         let problem = rewired.problem(&unwired);
         let lambda = constant(&problem, &options.settings)?;
         let Some(lambda) = lambda.filter(|lambda| *lambda > 0.0) else {

@@ -148,7 +148,7 @@ impl PosedProblem<'_> {
                 offset_n: offset_n.as_deref(),
                 ..self.unwired
             };
-            let rewired = self.options.wiring.apply(&unwired);
+            let rewired = (self.options.wiring).apply(&unwired, self.scene.design.supply.voltage_v);
             let reach = reachable(&rewired.problem(&unwired))?;
             all.add(height_m, &reach);
             if k % 2 == 0 {
@@ -261,10 +261,11 @@ impl WiredVectors {
         let vectors = (posed.scene).force_vectors_n_per_a(posed.solved, positions, progress)?;
         let axes = [0, 1, 2].map(|axis| {
             let along: Vec<f64> = vectors.iter().map(|force| force[axis]).collect();
-            posed.options.wiring.apply(&ForceProblem {
+            let unwired = ForceProblem {
                 forces_n_per_a: &along,
                 ..posed.unwired
-            })
+            };
+            (posed.options.wiring).apply(&unwired, posed.scene.design.supply.voltage_v)
         });
         let direction = posed.points.directions(posed.force);
         Ok(Self { axes, direction })

@@ -468,7 +468,8 @@ pub(crate) fn solve_at(
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
-    let rewired = (!options.wiring.is_plain()).then(|| options.wiring.apply(&unwired));
+    let voltage_v = scene.design.supply.voltage_v;
+    let rewired = (!options.wiring.is_plain()).then(|| options.wiring.apply(&unwired, voltage_v));
     let problem = rewired
         .as_ref()
         .map_or(unwired, |rewired| rewired.problem(&unwired));

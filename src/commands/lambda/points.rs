@@ -245,7 +245,8 @@ impl ForcePoints {
             weights: None,
             ..*unwired
         });
-        let rewired = samples.as_ref().map(|samples| wiring.apply(samples));
+        let voltage_v = at.scene.design.supply.voltage_v;
+        let rewired = (samples.as_ref()).map(|samples| wiring.apply(samples, voltage_v));
         let wired = samples
             .as_ref()
             .zip(rewired.as_ref())

@@ -11,7 +11,7 @@ use super::points::ForcesAt;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::lambda_file::LambdaFile;
-use crate::lambda::{self, ForceProblem, Settings, Wiring};
+use crate::lambda::{self, ForceProblem};
 use crate::progress::Progress;
 
 /// Points are lifted by this share of the lowest height: small enough for first order, and large
@@ -94,7 +94,9 @@ impl PosedProblem<'_> {
                 weights: weights.as_deref(),
                 ..*unwired
             };
-            chosen_lambda(&problem, &self.options.wiring, &self.options.settings)
+            let voltage_v = self.scene.design.supply.voltage_v;
+            let rewired = self.options.wiring.apply(&problem, voltage_v);
+            lambda::constant(&rewired.problem(&problem), &self.options.settings)
         };
         let (here, there) = rayon::join(
             || lambda(&here, &height_m),
@@ -126,13 +128,4 @@ impl PosedProblem<'_> {
 fn some<T: Copy>(values: &[T], width: usize, every: usize) -> Vec<T> {
     let rows = values.chunks_exact(width).step_by(every);
     rows.flatten().copied().collect()
-}
-
-fn chosen_lambda(
-    problem: &ForceProblem,
-    wiring: &Wiring,
-    settings: &Settings,
-) -> Result<Option<f64>, RunError> {
-    let rewired = wiring.apply(problem);
-    Ok(lambda::constant(&rewired.problem(problem), settings)?)
 }

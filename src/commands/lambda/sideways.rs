@@ -65,10 +65,11 @@ pub(crate) fn add(
         resistance_ohm: &resistance_ohm,
     };
     let wired = [&along_x, &along_y, &upward].map(|rows| {
-        options.wiring.apply(&ForceProblem {
+        let along = ForceProblem {
             forces_n_per_a: rows,
             ..given
-        })
+        };
+        (options.wiring).apply(&along, scene.design.supply.voltage_v)
     });
     let [of_x, of_y, of_z] = [0, 1, 2].map(|axis| wired[axis].problem(&given));
     let sides = [of_x.forces_n_per_a, of_y.forces_n_per_a];

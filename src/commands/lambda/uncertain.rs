@@ -82,7 +82,7 @@ pub(crate) fn add(
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
-    let limits = options.wiring.apply(&plain);
+    let limits = (options.wiring).apply(&plain, scene.design.supply.voltage_v);
     let surroundings = Surroundings {
         problem: limits.problem(&plain),
         direction: &chosen.directions(points, force),
@@ -201,7 +201,7 @@ fn wired(wiring: &Wiring, scene: &Scene, mut fields: Vec<Turned>) -> Vec<Turned>
             total_max_a: None,
             resistance_ohm: &scene.resistances_ohm(),
         };
-        let changed = wiring.apply(&plain);
+        let changed = wiring.apply(&plain, scene.design.supply.voltage_v);
         let values = changed.problem(&plain).forces_n_per_a;
         for (turned, value) in fields.iter_mut().zip(values) {
             turned[component] = *value;

@@ -62,6 +62,7 @@ pub(super) fn all(
 ) -> Result<Vec<LambdaVariant>, RunError> {
     let unwired = &posed.unwired;
     let (settings, wiring) = (&posed.options.settings, &posed.options.wiring);
+    let voltage_v = posed.scene.design.supply.voltage_v;
     let reversed_a: Vec<f64> = unwired.upper_a.iter().map(|u| -u).collect();
     let solve = |change: &Change, base: Option<f64>| {
         let problem = ForceProblem {
@@ -73,7 +74,7 @@ pub(super) fn all(
             },
             ..*unwired
         };
-        solved(&problem, settings, change, base)
+        solved(&problem, (settings, voltage_v), change, base)
     };
     let as_given = Change {
         name: "as given".to_owned(),
@@ -168,11 +169,11 @@ fn supply_and_series(posed: &PosedProblem, steel_pulls: bool, as_given: &Change)
 
 fn solved(
     problem: &ForceProblem,
-    settings: &Settings,
+    (settings, voltage_v): (&Settings, Option<f64>),
     change: &Change,
     base: Option<f64>,
 ) -> Result<LambdaVariant, RunError> {
-    let rewired = change.wiring.apply(problem);
+    let rewired = change.wiring.apply(problem, voltage_v);
     let wired = rewired.problem(problem);
     let solution = lambda::solve(&wired, settings)?;
     let worst = worst_point(&wired, settings)?;
