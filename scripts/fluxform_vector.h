@@ -281,24 +281,35 @@ static int is_nearest(const vector_problem *p, int rows)
     return 1;
 }
 
-/* Solves the free currents, of which there are no more than rows, for the nearest force; whether it is. */
+/* Whether no current of a coil gives a force: the request does not decide it. */
+static int is_idle(const vector_problem *p, size_t i)
+{
+    return dot(p->rows + 4 * i, p->rows + 4 * i, 3) == 0;
+}
+
+/* Solves the free currents, of which there are no more than rows, for the nearest force; whether it is. Coils
+ * without force do not count: they carry nothing, or where the sum binds what the others leave of it. */
 static int finish_nearest(vector_problem *p, int rows)
 {
     size_t free[4];
     int count = 0, unknowns;
     double left[4], base[4] = {0, 0, 0, 0}, columns[4][4], system[4][4], projected[4], solved[4], rest = 0, given = 0;
-    for (size_t i = 0; i < p->n; i++)
-        if ((int)p->at[i] == AT_FREE) {
-            if (count == 4)
-                return 0;
+    double idle = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        if ((int)p->at[i] != AT_FREE)
+            continue;
+        p->currents[i] = 0;
+        if (is_idle(p, i))
+            idle += p->conductance[i];
+        else if (count == 4)
+            return 0;
+        else
             free[count++] = i;
-        }
-    for (int a = 0; a < count; a++)
-        p->currents[free[a]] = 0;
+    }
     missing_force(p, left);
-    /* With a sum that binds, the last free coil takes what the others leave of it. */
+    /* With a sum that binds, the last free coil takes what the others leave of it, if all give a force. */
     unknowns = count;
-    if (rows == 4 && count > 0) {
+    if (rows == 4 && idle == 0 && count > 0) {
         unknowns = count - 1;
         memcpy(base, p->rows + 4 * free[unknowns], sizeof base);
         rest = left[3];
@@ -321,9 +332,12 @@ static int finish_nearest(vector_problem *p, int rows)
     }
     if (unknowns < count)
         p->currents[free[unknowns]] = left[3] - given;
-    for (int a = 0; a < count; a++) {
-        size_t i = free[a];
+    for (size_t i = 0; i < p->n; i++) {
         double slack = MET * (p->upper[i] - p->lower[i]);
+        if ((int)p->at[i] != AT_FREE)
+            continue;
+        if (rows == 4 && is_idle(p, i))
+            p->currents[i] = (left[3] - given) * p->conductance[i] / idle;
         if (!(p->currents[i] >= p->lower[i] - slack && p->currents[i] <= p->upper[i] + slack))
             return 0;
         p->currents[i] = clamp(p->currents[i], p->lower[i], p->upper[i]);

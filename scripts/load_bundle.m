@@ -540,15 +540,19 @@ end
 function [d, nearest] = finish_nearest(d, n)
 % Solves the free currents, few as they are, for the nearest force; whether it is.
     nearest = false;
-    free = find(d.at == 0);
+    all_free = find(d.at == 0);
+    d.currents(all_free) = 0;
+    % Coils without force carry nothing, or where the sum binds what the others leave of it.
+    forceless = ~any(d.rows(all_free, 1:3), 2);
+    free = all_free(~forceless);
+    idle = all_free(forceless);
     if numel(free) > 4
         return
     end
-    d.currents(free) = 0;
     left = missing_force(d);
-    % With a sum that binds, the last free coil takes what the others leave of it.
+    % Without any of them the last free coil takes it.
     last = free([]);
-    if n == 4
+    if n == 4 && isempty(idle)
         last = free(max(numel(free), 1):end);
     end
     others = free(1:numel(free) - numel(last));
@@ -568,12 +572,16 @@ function [d, nearest] = finish_nearest(d, n)
     if ~isempty(last)
         d.currents(last) = left(4) - sum(d.currents(others));
     end
-    slack = 1e-11 * (d.upper(free) - d.lower(free));
-    found = d.currents(free);
-    if ~all(found >= d.lower(free) - slack & found <= d.upper(free) + slack)
+    if n == 4 && ~isempty(idle)
+        share = d.conductance(idle) / sum(d.conductance(idle));
+        d.currents(idle) = (left(4) - sum(d.currents(others))) * share;
+    end
+    slack = 1e-11 * (d.upper(all_free) - d.lower(all_free));
+    found = d.currents(all_free);
+    if ~all(found >= d.lower(all_free) - slack & found <= d.upper(all_free) + slack)
         return
     end
-    d.currents(free) = min(max(found, d.lower(free)), d.upper(free));
+    d.currents(all_free) = min(max(found, d.lower(all_free)), d.upper(all_free));
     nearest = is_nearest(d, n);
 end
 

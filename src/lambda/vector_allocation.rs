@@ -457,27 +457,36 @@ impl VectorAllocator {
         y.iter().map(|v| v.abs()).sum()
     }
 
+    /// Whether no current of a coil gives a force: the request does not decide it.
+    fn idle(&self, i: usize) -> bool {
+        self.rows[i][..3] == [0.0; 3]
+    }
+
     /// Solves the free currents for the nearest force, of which there are no more than components;
-    /// whether no other currents within the limits come nearer.
+    /// whether no other currents within the limits come nearer. Coils without force do not count: they
+    /// carry nothing, or where the sum binds what the others leave of it, by the least power.
     fn finish_nearest(&mut self, rows: usize, target: &Rows) -> bool {
         const MOST: usize = 4;
         let mut free = [0; MOST];
         let mut count = 0;
-        for (i, at) in self.at.iter().enumerate() {
-            if *at == Limit::Free {
-                if count == MOST {
-                    return false;
-                }
+        let mut idle = 0.0;
+        for i in 0..self.at.len() {
+            if self.at[i] != Limit::Free {
+                continue;
+            }
+            self.currents[i] = 0.0;
+            if self.idle(i) {
+                idle += self.conductance[i];
+            } else if count == MOST {
+                return false;
+            } else {
                 free[count] = i;
                 count += 1;
             }
         }
-        for &i in &free[..count] {
-            self.currents[i] = 0.0;
-        }
         let (left, _) = self.left(target);
-        // With a sum that binds, the last free coil takes what the others leave of it.
-        let last = (rows == 4 && count > 0).then(|| free[count - 1]);
+        // With a sum that binds, the last free coil takes what the others leave of it, if all give a force.
+        let last = (rows == 4 && idle == 0.0 && count > 0).then(|| free[count - 1]);
         let unknowns = if last.is_some() { count - 1 } else { count };
         let column = |i: usize| -> Rows {
             let h = self.rows[i];
@@ -507,10 +516,17 @@ impl VectorAllocator {
         for a in 0..unknowns {
             self.currents[free[a]] = solved[a];
         }
+        let of_sum = left[3] - solved[..unknowns].iter().sum::<f64>();
         if let Some(last) = last {
-            self.currents[last] = left[3] - solved[..unknowns].iter().sum::<f64>();
+            self.currents[last] = of_sum;
         }
-        for &i in &free[..count] {
+        for i in 0..self.at.len() {
+            if self.at[i] != Limit::Free {
+                continue;
+            }
+            if rows == 4 && self.idle(i) {
+                self.currents[i] = of_sum * self.conductance[i] / idle;
+            }
             let (lower, upper) = self.limits.limits_a(i);
             let slack = MET * (upper - lower);
             if self.currents[i] < lower - slack || self.currents[i] > upper + slack {

@@ -240,6 +240,13 @@ fn forces_on_samples(other: Option<&Loader>) {
             true,
             [13, 17, 11],
         ),
+        ("upright vector, reversing", false, false, [13, 17, 11]),
+        (
+            "upright vector, two idle, reversing, a small sum",
+            false,
+            false,
+            [13, 17, 11],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("bundle");
@@ -253,9 +260,13 @@ fn forces_on_samples(other: Option<&Loader>) {
         if name.contains("uncertain") {
             sample = sample.with_uncertainty(if pulled { 0.004 } else { 0.0 });
         }
-        // Broke: currents chosen for uncertainties had a larger sum.
-        if name.contains("small sum") {
-            sample = sample.reversing(Some(0.4));
+        if name.contains("two idle") {
+            sample = sample.without_force(1);
+        }
+        // Broke: currents chosen for uncertainties had a larger sum, and coils without force kept the
+        // others from the nearest one.
+        if name.contains("reversing") {
+            sample = sample.reversing(name.contains("small sum").then_some(0.4));
         }
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();

@@ -219,6 +219,50 @@ fn currents_are_those_of_the_exhaustive_search() {
     assert_eq!(unproven, 0);
 }
 
+/// Broke: coils without force on drivers that reverse counted among the free ones, and what was nearest was not found.
+#[test]
+fn coils_without_force_leave_the_nearest_force_to_the_others() {
+    let mut random = Random::new(23);
+    let (mut out_of_reach, mut full) = (0, 0);
+    for number in 0..1500 {
+        let mut problem = Problem::random(&mut random);
+        let idle = 1 + number % 3;
+        for (k, limit) in [0.9, 0.4, 1.3].into_iter().take(idle).enumerate() {
+            let at = k.min(problem.coils());
+            problem.force_n_per_a.insert(at, [0.0; 3]);
+            problem.resistance_ohm.insert(at, 5.0 + k as f64);
+            problem.lower_a.insert(at, -limit);
+            problem.upper_a.insert(at, 0.7);
+        }
+        if problem.coils() > 5 {
+            continue;
+        }
+        let (currents, result) = problem.solve();
+        let (missing, power) = problem.exhaustive();
+        assert!(
+            problem.within_limits(&currents, 1e-9),
+            "{number}: {problem:?} {currents:?}"
+        );
+        assert!(result.proven, "{number}: {problem:?} {currents:?}");
+        let own = problem.missing_n(&currents);
+        assert!(
+            (own - missing).abs() <= 1e-9,
+            "{number}: missing {own} of {missing}; {problem:?}"
+        );
+        let own = problem.power_w(&currents);
+        let close = (own - power).abs() <= 1e-7 * power.max(1e-6);
+        assert!(
+            close,
+            "{number}: power {own} of {power}; {problem:?} {currents:?}"
+        );
+        out_of_reach += usize::from(result.reach == Reach::Saturated);
+        let sum: f64 = currents.iter().sum();
+        let binds = problem.total_a.is_some_and(|total| sum > total - 1e-9);
+        full += usize::from(binds && result.reach == Reach::Saturated);
+    }
+    assert!(out_of_reach > 300 && full > 30, "{out_of_reach} {full}");
+}
+
 #[test]
 fn a_force_far_beyond_reach_keeps_the_limits() {
     let mut random = Random::new(17);

@@ -103,6 +103,13 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
             true,
             [13, 17, 11],
         ),
+        ("upright vector, reversing", false, false, [13, 17, 11]),
+        (
+            "upright vector, two idle, reversing, a small sum",
+            false,
+            false,
+            [13, 17, 11],
+        ),
         (
             "tilted vector, uncertain with pull",
             true,
@@ -123,8 +130,11 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         if name.contains("uncertain") {
             sample = sample.with_uncertainty(0.004);
         }
-        if name.contains("small sum") {
-            sample = sample.reversing(Some(0.4));
+        if name.contains("two idle") {
+            sample = sample.without_force(1);
+        }
+        if name.contains("reversing") {
+            sample = sample.reversing(name.contains("small sum").then_some(0.4));
         }
         let target = folder.path().join("bundle");
         sample.write(&target, false).unwrap();

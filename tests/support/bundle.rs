@@ -352,6 +352,17 @@ impl Sample {
         self
     }
 
+    /// The sample of a bundle in which this coil of the map gives no force.
+    pub fn without_force(mut self, coil: usize) -> Self {
+        let map = &mut self.map;
+        let nodes = map.gz_t_per_m_per_a.len() / map.coil.len();
+        let sides = map.sides_t_per_m_per_a.iter_mut().flatten();
+        for component in sides.chain([&mut map.gz_t_per_m_per_a]) {
+            component.to_mut()[coil * nodes..(coil + 1) * nodes].fill(0.0);
+        }
+        self
+    }
+
     /// The sample of a bundle of schema 1.1: without what position feedback needs.
     pub fn without_rendering(mut self) -> Self {
         self.map.runtime.rendering = None;

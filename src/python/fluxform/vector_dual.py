@@ -117,13 +117,16 @@ class Dual:
 
     def finish_nearest(self, n):
         """Solves the free currents, few as they are, for the nearest force; whether it is."""
-        free = np.flatnonzero(self.at == 0)
+        all_free = np.flatnonzero(self.at == 0)
+        self.currents[all_free] = 0.0
+        # Coils without force carry nothing, or where the sum binds what the others leave of it.
+        forceless = ~np.any(self.rows[all_free, :3], axis=1)
+        free, idle = all_free[~forceless], all_free[forceless]
         if len(free) > 4:
             return False
-        self.currents[free] = 0.0
         left, _ = self.left()
-        # With a sum that binds, the last free coil takes what the others leave of it.
-        last = free[-1:] if n == 4 else free[:0]
+        # Without any of them the last free coil takes it.
+        last = free[-1:] if n == 4 and len(idle) == 0 else free[:0]
         others = free[: len(free) - len(last)]
         base = self.rows[last, :3].sum(axis=0)
         rest = left[3] if len(last) else 0.0
@@ -134,12 +137,15 @@ class Dual:
             if solved is None:
                 return False
         self.currents[others] = solved
-        self.currents[last] = left[3] - np.sum(solved) if len(last) else 0.0
-        slack = self.MET * (self.upper - self.lower)[free]
-        found = self.currents[free]
-        if not np.all((found >= self.lower[free] - slack) & (found <= self.upper[free] + slack)):
+        self.currents[last] = left[3] - np.sum(solved)
+        if n == 4 and len(idle):
+            share = self.conductance[idle] / np.sum(self.conductance[idle])
+            self.currents[idle] = (left[3] - np.sum(solved)) * share
+        lower, upper, found = self.lower[all_free], self.upper[all_free], self.currents[all_free]
+        slack = self.MET * (upper - lower)
+        if not np.all((found >= lower - slack) & (found <= upper + slack)):
             return False
-        self.currents[free] = np.clip(found, self.lower[free], self.upper[free])
+        self.currents[all_free] = np.clip(found, lower, upper)
         return self.nearest(n)
 
     def nearest(self, n):
