@@ -283,6 +283,15 @@ fn of_surface(given: &Uncertainty, vector: bool, cap_w: Option<f64>) -> Study {
             positions.push([x, y, 0.034 - 6.0 * (x * x + 0.7 * y * y)]);
         }
     }
+    of_places(&positions, given, vector, cap_w)
+}
+
+fn of_places(
+    positions: &[[f64; 3]],
+    given: &Uncertainty,
+    vector: bool,
+    cap_w: Option<f64>,
+) -> Study {
     let heights: Vec<f64> = positions.iter().map(|place| place[2]).collect();
     let around = displacements_m(given);
     let moved = |place: [f64; 3], by: [f64; 3]| std::array::from_fn(|axis| place[axis] + by[axis]);
@@ -359,6 +368,26 @@ fn a_thousand_random_displays_give_what_is_promised() {
             }
         };
         assert!(aim(&found.robust.error.promised) <= 1.05 * aim(&found.feedback.promised));
+    }
+}
+
+/// Broke: the worst of the random displays was worse than the worst that was promised, between the tilts that were tried.
+#[test]
+fn no_random_display_is_worse_than_the_worst_promised() {
+    for k in 0..6 {
+        let x = 0.007 * f64::from(k) - 0.011;
+        let found = of_places(&[[x, 0.013, 0.03]], &ALL.only(Cause::Tilt), true, None);
+        for error in [
+            found.fixed,
+            found.feedback,
+            found.robust_static.error,
+            found.robust.error,
+        ] {
+            assert!(
+                error.realised.worst <= error.promised.worst,
+                "{k}: {error:?}"
+            );
+        }
     }
 }
 

@@ -39,6 +39,8 @@ pub type Turned = [f64; 9];
 
 /// Places of the rule of degree 5 over a box.
 const RULE: usize = 14;
+/// Edges of a box.
+const EDGES: usize = 12;
 /// Shares of the box's half widths at which its places are, on the axes and on the diagonals, and weights.
 const ON_AXES: (f64, f64) = (0.795_822_425_754_221_5, 40.0 / 361.0);
 const ON_DIAGONALS: (f64, f64) = (0.758_786_910_639_328_1, 121.0 / 2888.0);
@@ -52,8 +54,8 @@ enum Reach {
     Half,
     /// Those of the rule over the box.
     Whole,
-    /// Corners and faces of the box: all components of a force are harmonic, so the largest error is on
-    /// its surface.
+    /// Faces, corners and edges of the box, at their middles: all components of a force are harmonic, so
+    /// the largest error is on its surface.
     Surface,
 }
 
@@ -63,7 +65,7 @@ impl Reach {
             Self::Point => 0..1,
             Self::Half => 1..1 + RULE,
             Self::Whole => 1 + RULE..1 + 2 * RULE,
-            Self::Surface => 1 + 2 * RULE..1 + 3 * RULE,
+            Self::Surface => 1 + 2 * RULE..1 + 3 * RULE + EDGES,
         }
     }
 }
@@ -87,7 +89,18 @@ fn displaced(on_axis: f64, on_diagonal: f64) -> impl Iterator<Item = [f64; 3]> {
     axes.chain(diagonals)
 }
 
-/// Displacements from a point at which forces are needed, m: one where the position is exact, 43 otherwise.
+/// Middles of the edges of a box whose half widths are 1.
+fn edges() -> impl Iterator<Item = [f64; 3]> {
+    (0..EDGES).map(|k| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let mut place = [0.0; 3];
+        place[(k / 4 + 1) % 3] = sign(0);
+        place[(k / 4 + 2) % 3] = sign(1);
+        place
+    })
+}
+
+/// Displacements from a point at which forces are needed, m: one where the position is exact, 55 otherwise.
 #[must_use]
 pub fn displacements_m(given: &Uncertainty) -> Vec<[f64; 3]> {
     let s = given.sensor_m;
@@ -102,6 +115,7 @@ pub fn displacements_m(given: &Uncertainty) -> Vec<[f64; 3]> {
         .chain(of(0.5, rule))
         .chain(of(1.0, rule))
         .chain(of(1.0, (1.0, 1.0)))
+        .chain(edges().map(move |place| place.map(|v| s * v)))
         .collect()
 }
 
