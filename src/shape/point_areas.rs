@@ -40,7 +40,7 @@ const BISECTIONS: u32 = 16;
 /// The same of a part of a cell: to 4e-3 of it.
 const PART_BISECTIONS: u32 = 8;
 /// The least that a point stands for, of a cell: no point counts for nothing.
-const LEAST: f64 = 1e-6;
+pub(super) const LEAST: f64 = 1e-6;
 /// Sides between two looks at the progress.
 const STRIDE: usize = 1024;
 
@@ -405,6 +405,23 @@ fn covered_part(
     }
     // A surface that ends at the node itself goes nowhere from it.
     if low == 0.0 { 0.0 } else { 0.5 * (low + high) }
+}
+
+/// The part of a rectangle that is covered, by its corners one after the other around it, where the
+/// surface's border meets each side once at most.
+pub(super) fn covered_share(corners: [[f64; 2]; 4], covered: &dyn Fn([f64; 2]) -> bool) -> f64 {
+    let has = corners.map(covered);
+    let part = |k: usize| {
+        let next = (k + 1) % 4;
+        let side =
+            |from: usize, to: usize| covered_part(corners[from], corners[to], covered, BISECTIONS);
+        match [has[k], has[next]] {
+            [true, false] => side(k, next),
+            [false, true] => side(next, k),
+            _ => 1.0,
+        }
+    };
+    cell_shares(has, [0, 1, 2, 3].map(part)).iter().sum()
 }
 
 /// The share of each cell of a grid that its corners get.

@@ -11,6 +11,7 @@ use crate::error::ShapeError;
 use crate::height::{Grid, Sample, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
+use crate::point_areas::covered_share;
 use crate::point_flags::{self, Marks, Rules};
 use crate::primitive::PlacedPrimitive;
 use crate::surface::Surface;
@@ -182,6 +183,30 @@ impl<'a> Probe<'a> {
             Kind::Primitive(primitive) => {
                 let [width, depth] = rect.sides();
                 primitive.distance_in_plan_m(rect.centre()) <= 0.5 * width.hypot(depth)
+            }
+        }
+    }
+
+    /// Whether the surface covers a rectangle whose corners it covers, but for what rounding leaves open.
+    fn covers_all(&self, rect: &Rect, among: &[u32]) -> bool {
+        match &self.kind {
+            Kind::Mesh { rules, .. } => self
+                .sorted()
+                .is_some_and(|faces| faces.covered(rect, among, rules.reach_m)),
+            // Every formula is convex in plan.
+            Kind::Primitive(_) => true,
+        }
+    }
+
+    /// The plan area of the surface over a rectangle, m^2.
+    fn covered_m2(&self, rect: &Rect, among: &[u32]) -> f64 {
+        match &self.kind {
+            Kind::Mesh { .. } => self
+                .sorted()
+                .map_or(0.0, |faces| faces.covered_m2(rect, among)),
+            Kind::Primitive(_) => {
+                let [width, depth] = rect.sides();
+                width * depth * covered_share(rect.corners(), &|p| self.covers(p))
             }
         }
     }

@@ -99,7 +99,8 @@ fn vertical_bound(
         return otherwise;
     }
     let covered = |(cell, patch): &(usize, Patch)| {
-        lattice.faces.covered(&patch.rect, &lattice.members(*cell))
+        let members = lattice.members(*cell);
+        lattice.faces.covered(&patch.rect, &members, 0.0)
     };
     if patches.iter().all(covered) {
         vertical.bound_m()
@@ -330,7 +331,7 @@ impl Search<'_> {
         for (order, (cell, patch)) in patches.iter().enumerate() {
             progress.check()?;
             let members = lattice.members(*cell);
-            let covered = self.faces.covered(&patch.rect, &members);
+            let covered = self.faces.covered(&patch.rect, &members, 0.0);
             let mut bound_m = self.bound_of_rect(&patch.rect, patch);
             if covered && bound_m > self.enough_m() {
                 let known = Extreme {

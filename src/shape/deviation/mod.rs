@@ -9,6 +9,7 @@ mod hausdorff;
 pub(super) mod piece;
 mod primitive;
 mod sheets;
+mod union;
 mod visible;
 
 use std::borrow::Cow;
@@ -27,6 +28,7 @@ use fluxform_base::progress::{self, Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 
 use self::piece::Hair;
+use self::union::area_m2;
 use self::visible::{HIGHEST, Look, supremum_over_visible};
 
 pub use self::hausdorff::{Interval, hausdorff};
@@ -304,8 +306,8 @@ impl Faces {
         kept
     }
 
-    /// Whether the faces leave no part of the rectangle open.
-    pub(super) fn covered(&self, rect: &Rect, among: &[u32]) -> bool {
+    /// Whether the faces leave no part of the rectangle open that is wider than `slack_m`.
+    pub(super) fn covered(&self, rect: &Rect, among: &[u32], slack_m: f64) -> bool {
         let heights = among.iter().map(|face| self.list[*face as usize].heights);
         let lowest = heights.fold(f64::INFINITY, |m, [low, _]| m.min(low));
         if among.is_empty() {
@@ -313,17 +315,37 @@ impl Faces {
         }
         // A floor under everything is hidden wherever there is surface.
         let floor_m = lowest - lowest.abs() - 1.0;
+        let mut look = self.look();
+        look.hair.plan_m = look.hair.plan_m.max(slack_m);
         let mut open = false;
         self.leaves(*rect, among, DEEPEST, &mut |leaf| {
+            if open || leaf.plain {
+                return;
+            }
             let faces = leaf.faces.iter();
             let others: Vec<_> = faces.map(|face| self.list[*face as usize]).collect();
-            open |= !leaf.plain
-                && piece::Face::floor(leaf.rect, floor_m).is_none_or(|floor| {
-                    let whole = floor.within(leaf.rect);
-                    supremum_over_visible(&floor, &whole, &others, self.look(), &|_| 0.0).is_some()
-                });
+            open = piece::Face::floor(leaf.rect, floor_m).is_none_or(|floor| {
+                let whole = floor.within(leaf.rect);
+                supremum_over_visible(&floor, &whole, &others, look, &|_| 0.0).is_some()
+            });
         });
         !open && !self.effort.is_spent()
+    }
+
+    /// The area of the rectangle that the faces cover, once where they lie over each other, m^2.
+    pub(super) fn covered_m2(&self, rect: &Rect, among: &[u32]) -> f64 {
+        let mut sum_m2 = 0.0;
+        self.leaves(*rect, among, DEEPEST, &mut |leaf| {
+            sum_m2 += if leaf.plain {
+                let [width, depth] = leaf.rect.sides();
+                width * depth
+            } else {
+                let faces = leaf.faces.iter();
+                let parts = faces.map(|face| self.list[*face as usize].within(leaf.rect));
+                area_m2(&parts.collect::<Vec<_>>())
+            };
+        });
+        sum_m2
     }
 
     fn compare(&self, leaf: &Leaf<'_>, patch: &Patch, worst: &mut Worst) {

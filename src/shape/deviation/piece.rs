@@ -44,7 +44,7 @@ impl Rect {
     }
 
     /// Its four corners, in turn.
-    pub(super) fn corners(&self) -> [Point; 4] {
+    pub(crate) fn corners(&self) -> [Point; 4] {
         let ([x, y], [u, v]) = (self.low_m, self.high_m);
         [[x, y], [u, y], [u, v], [x, v]]
     }

@@ -1,8 +1,9 @@
 //! Points as dense as a deviation asks for: a quadtree whose leaves are bilinear patches.
 //!
-//! A rectangle is quartered until its patch lies within the deviation everywhere, certified as for
-//! a grid. Where the surface jumps or ends no patch can follow it; there the quartering stops at
-//! rectangles no wider than the deviation, so that the step is known to that in plan.
+//! A rectangle is quartered until the surface covers all of it and its patch lies within the deviation
+//! everywhere, certified as for a grid. Where the surface jumps or ends no patch can follow it; there the
+//! quartering stops at rectangles no wider than the deviation, so that the step is known to that in
+//! plan, and what such a rectangle weighs is its area that has surface.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +11,7 @@ use super::{MOST_POINTS, Probe, Scattered, too_many};
 use crate::deviation::{Patch, Rect};
 use crate::error::ShapeError;
 use crate::height::Sample;
+use crate::point_areas::LEAST;
 use crate::point_flags::Marks;
 use fluxform_base::progress::Progress;
 
@@ -186,7 +188,8 @@ impl Work<'_> {
         {
             let corners_m = [a, b, c, d];
             let off_m = self.probe.deviation_m(&Patch { rect, corners_m }, members);
-            if off_m <= self.grading.max_deviation_m {
+            // A hole or a notch between the corners is no surface that could deviate.
+            if off_m <= self.grading.max_deviation_m && self.probe.covers_all(&rect, members) {
                 self.result.leaves += 1;
                 self.result.vertical_m = self.result.vertical_m.max(off_m);
                 self.weigh(&corners, sides[0] * sides[1]);
@@ -196,7 +199,8 @@ impl Work<'_> {
         if widest_m <= self.grading.max_deviation_m || level == 0 {
             self.result.borders += 1;
             self.result.border_m = self.result.border_m.max(widest_m);
-            self.weigh(&corners, sides[0] * sides[1]);
+            let covered_m2 = self.probe.covered_m2(&rect, members);
+            self.weigh(&corners, covered_m2.max(LEAST * sides[0] * sides[1]));
             return Ok(());
         }
         let half = size / 2;
@@ -210,9 +214,11 @@ impl Work<'_> {
 
     /// Gives a leaf's area to its corners with surface, in equal parts.
     fn weigh(&mut self, corners: &[Node; 4], area_m2: f64) {
+        let has = |corner: &&Node| matches!(self.nodes.get(&[corner[1], corner[0]]), Some(Some(_)));
+        let share_m2 = area_m2 / corners.iter().filter(has).count() as f64;
         for corner in corners {
             if let Some(Some((_, _, weight_m2))) = self.nodes.get_mut(&[corner[1], corner[0]]) {
-                *weight_m2 += area_m2 / 4.0;
+                *weight_m2 += share_m2;
             }
         }
     }
