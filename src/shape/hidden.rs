@@ -13,7 +13,7 @@ use crate::index::Index;
 use crate::mesh::Mesh;
 use crate::point_flags::{self, Rules, contacts, is_closed, is_oriented};
 use crate::surface::Surface;
-use crate::vertical_hit::{Contact, may_touch};
+use crate::vertical_hit::{Contact, is_wall, may_touch};
 use fluxform_numerics::axis::Axis;
 use fluxform_numerics::vec3::{cross, dot, minus};
 
@@ -92,8 +92,8 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let level = LEVEL * dot(normal, normal).sqrt();
         let p = [point[0], point[1]];
         let covered = is_covered(triangles, index.at(p), (facet, point), depth_m, rules);
-        // A wall, seen edge-on, hides nothing by itself.
-        if normal[2].abs() <= level {
+        // A wall, seen edge-on, hides nothing by itself; the file's rounding may make it lean.
+        if normal[2].abs() <= level || is_wall(&triangles[facet], rules.reach_m) {
             return [1, 0, 0, 0];
         }
         let up = usize::from(if by_sheets {

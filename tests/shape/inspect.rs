@@ -1,8 +1,11 @@
 //! Report on a surface's file before it is placed.
 
-use fluxform_shape::MeshReport;
-use fluxform_shape::document::SurfaceFormat;
+use fluxform_shape::document::{Placement, SurfaceFormat};
 use fluxform_shape::file_mesh::{FileMesh, Triangle};
+use fluxform_shape::hidden::Hidden;
+use fluxform_shape::mesh::Mesh;
+use fluxform_shape::placement::Transform;
+use fluxform_shape::{MeshReport, Surface};
 
 use fluxform_testing::boxes::block;
 
@@ -91,4 +94,34 @@ fn a_unit_is_guessed_by_size_and_never_where_the_file_has_one() {
     assert_eq!(guesses(0.073), ["m"]);
     assert_eq!(guesses(2.9), ["in", "cm"]);
     assert!(guesses(7e4).is_empty());
+}
+
+/// A plain cube of 10 mm whose walls lean by less than its file's rounding had four undercut walls.
+#[test]
+fn walls_that_lean_within_the_files_rounding_hide_nothing() {
+    let hidden = |inset: f64| {
+        let mut triangles = block([-5.0, -5.0, 0.0], [5.0, 5.0, 10.0]);
+        for corner in triangles.as_flattened_mut() {
+            if corner[2] > 5.0 {
+                let [x, y, _] = corner;
+                (*x, *y) = (*x - x.signum() * inset, *y - y.signum() * inset);
+            }
+        }
+        let file = FileMesh {
+            triangles,
+            coordinate_rounding: 5e-5,
+            ..FileMesh::default()
+        };
+        let placed = Transform::new(1e-3, &Placement::default());
+        let mesh = Mesh::place(file, &placed).unwrap();
+        Hidden::of(&Surface::Mesh(mesh)).unwrap()
+    };
+    for inset in [0.0, 4e-5, -4e-5] {
+        let found = hidden(inset);
+        let off = found.of_area - 1.0 / 6.0;
+        assert!(
+            found.of_upward == 0.0 && off.abs() < 0.01,
+            "{inset}: {found:?}"
+        );
+    }
 }
