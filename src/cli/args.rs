@@ -172,7 +172,12 @@ pub struct SurfaceFlags {
     )]
     pub fit: Option<String>,
     /// Also scale it to fill that box
-    #[arg(long, hide_short_help = true, requires = "fit")]
+    #[arg(
+        long,
+        hide_short_help = true,
+        requires = "fit",
+        conflicts_with = "center"
+    )]
     pub scale_to_fit: bool,
     /// STEP: farthest that a facet may lie from its face, like 0.01mm [default: a 4000th of the
     /// diagonal of the bodies' box]
@@ -246,7 +251,13 @@ impl From<UncertaintyFlags> for UncertaintyOverride {
     }
 }
 
+/// Flags of a grid's points, which points on no grid leave without effect.
+const OF_A_GRID: [&str; 4] = ["weights", "error", "refine", "grid"];
+
 /// Points on no grid.
+///
+/// What a flag requires may exclude others. clap drops the requirement where one of those is given, so
+/// the flag itself excludes them too.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SamplingFlags {
     /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
@@ -255,7 +266,7 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "LENGTH",
         value_parser = values::length_with_unit,
-        conflicts_with_all = ["weights", "error"]
+        conflicts_with_all = OF_A_GRID
     )]
     max_deviation: Option<f64>,
     /// No patch wider than this [default: for `discretize` no limit, for `lambda` a sixteenth of the
@@ -265,7 +276,8 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "LENGTH",
         value_parser = values::length_with_unit,
-        requires = "max_deviation"
+        requires = "max_deviation",
+        conflicts_with_all = OF_A_GRID
     )]
     max_width: Option<f64>,
     /// Choose points at random, none nearer to another than this (2mm)
@@ -274,7 +286,8 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "SPACING",
         value_parser = values::length_with_unit,
-        conflicts_with_all = ["max_deviation", "weights", "error"]
+        conflicts_with_all = ["max_deviation", "max_width"],
+        conflicts_with_all = OF_A_GRID
     )]
     poisson: Option<f64>,
     /// Which random points
@@ -283,7 +296,9 @@ pub struct SamplingFlags {
         hide_short_help = true,
         value_name = "N",
         default_value_t = 0,
-        requires = "poisson"
+        requires = "poisson",
+        conflicts_with_all = ["max_deviation", "max_width"],
+        conflicts_with_all = OF_A_GRID
     )]
     seed: u64,
 }

@@ -160,3 +160,47 @@ fn completions_and_manual_pages() {
         .says(&["exists", "--force"]);
     place.run(&["man", "--out", "man1", "--force"]).ends(0);
 }
+
+/// The arguments that `arg` requires. clap has no way to ask for them but its description of an argument.
+fn required(arg: &clap::Arg) -> Vec<String> {
+    let described = format!("{arg:?}");
+    let (_, rest) = described.split_once(" requires: [").unwrap();
+    let (list, _) = rest.split_once(']').unwrap();
+    let quoted = list.split('"').skip(1).step_by(2);
+    quoted.map(str::to_owned).collect()
+}
+
+/// clap drops what an argument requires where another one that is given excludes that: the argument was
+/// taken and had no effect. So it must exclude those others itself.
+#[test]
+fn what_excludes_a_required_argument_excludes_what_requires_it() {
+    let main = fluxform::commands::command();
+    let (mut pairs, mut wrong) = (0, Vec::new());
+    for path in commands() {
+        let command = path.iter().fold(&main, |command, name| {
+            command.find_subcommand(name).expect("a command")
+        });
+        let all: Vec<&clap::Arg> = command.get_arguments().collect();
+        let excludes = |a: &clap::Arg, b: &clap::Arg| {
+            let either = [(a, b), (b, a)];
+            either.iter().any(|(of, other)| {
+                let excluded = command.get_arg_conflicts_with(of);
+                excluded.iter().any(|arg| arg.get_id() == other.get_id())
+            })
+        };
+        for arg in &all {
+            for id in required(arg) {
+                let needed = all.iter().find(|other| other.get_id() == id.as_str());
+                let needed = needed.expect("an argument of the same command");
+                let others = all.iter().filter(|other| other.get_id() != arg.get_id());
+                for other in others.filter(|other| excludes(needed, other)) {
+                    pairs += 1;
+                    if !excludes(arg, other) {
+                        wrong.push(format!("{path:?}: {arg} with {other}, without {needed}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(pairs > 30 && wrong.is_empty(), "{pairs}: {wrong:#?}");
+}

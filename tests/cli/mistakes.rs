@@ -3,10 +3,102 @@
 use crate::SEED;
 use fluxform_testing::place::Place;
 
+const BALL: &str = "shapes/half_sphere.toml";
+
 /// A mistake: arguments, exit code, and what the message says.
 type Mistake = (&'static [&'static str], i32, &'static [&'static str]);
 
 const MISTAKES: &[Mistake] = &[
+    // A flag whose required flag another one excludes had no effect, without a word.
+    (
+        &["discretize", BALL, "--center", "--scale-to-fit"],
+        2,
+        &["--scale-to-fit", "cannot be used with", "--center"],
+    ),
+    (
+        &["discretize", BALL, "--out", "a.csv", "--over", SEED],
+        2,
+        &["--over", "cannot be used with", "--out"],
+    ),
+    (
+        &["lambda", SEED, BALL, "--max-deviation", "1mm", "--refine"],
+        2,
+        &["--max-deviation", "cannot be used with", "--refine"],
+    ),
+    (
+        &[
+            "lambda",
+            SEED,
+            BALL,
+            "--poisson",
+            "5mm",
+            "--max-width",
+            "1mm",
+        ],
+        2,
+        &["--poisson", "cannot be used with", "--max-width"],
+    ),
+    (
+        &["discretize", BALL, "--max-deviation", "1mm", "--seed", "4"],
+        2,
+        &["--max-deviation", "cannot be used with", "--seed"],
+    ),
+    (
+        &["probe", SEED, "tabs.csv", "--noise-t", "2e-6"],
+        2,
+        &["cannot be used with", "--noise-t"],
+    ),
+    // What grids alone have, neither refused nor done for other points.
+    (
+        &[
+            "discretize",
+            BALL,
+            "--max-deviation",
+            "1mm",
+            "--holes",
+            "error",
+        ],
+        2,
+        &["--max-deviation", "cannot be used with", "--holes"],
+    ),
+    (
+        &[
+            "discretize",
+            BALL,
+            "--poisson",
+            "3mm",
+            "--certify",
+            "distance",
+        ],
+        2,
+        &["--poisson", "cannot be used with", "--certify"],
+    ),
+    (
+        &[
+            "discretize",
+            BALL,
+            "--max-deviation",
+            "1mm",
+            "--certify-seconds",
+            "3",
+        ],
+        2,
+        &[
+            "--max-deviation",
+            "cannot be used with",
+            "--certify-seconds",
+        ],
+    ),
+    (
+        &["lambda", SEED, BALL, "--poisson", "5mm", "--grid", "9x9"],
+        2,
+        &["--poisson", "cannot be used with", "--grid"],
+    ),
+    (
+        &["discretize", BALL, "--inspect", "--weights", "area"],
+        2,
+        &["--inspect", "cannot be used with", "--weights"],
+    ),
     // A shape where the design belongs was 15 errors on 173 lines.
     (
         &["lambda", "shapes/flat.toml", SEED],

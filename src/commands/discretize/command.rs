@@ -26,6 +26,19 @@ use crate::shape::certificate::Certify;
 use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::holes::Holes;
 
+/// Flags of points on no grid.
+const ON_NO_GRID: [&str; 4] = ["max_deviation", "max_width", "poisson", "seed"];
+/// Flags of a grid's points, which `--inspect` does not make.
+const OF_A_GRID: [&str; 7] = [
+    "holes",
+    "certify",
+    "certify_seconds",
+    "weights",
+    "out",
+    "error",
+    "refine",
+];
+
 /// Turn a surface into constraint points with heights and normals
 ///
 /// Samples a surface on a grid: the height of every point is the highest place where the vertical
@@ -64,15 +77,17 @@ pub struct Discretize {
     pub(super) out: FileArgument,
     /// Grid points without surface inside the silhouette: leave them out, fill them from around,
     /// or refuse the surface
-    #[arg(long, hide_short_help = true, default_value = Holes::default().name(), value_parser = values::named::<Holes>())]
+    #[arg(long, hide_short_help = true, default_value = Holes::default().name(), value_parser = values::named::<Holes>(),
+          conflicts_with_all = ON_NO_GRID)]
     holes: Holes,
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
-    #[arg(long, hide_short_help = true, default_value = Certify::Vertical.name(), value_parser = values::named::<Certify>())]
+    #[arg(long, hide_short_help = true, default_value = Certify::Vertical.name(), value_parser = values::named::<Certify>(),
+          conflicts_with_all = ON_NO_GRID)]
     certify: Certify,
     /// Seconds of one core, about, that --certify may take; then the points come without a certificate,
     /// with a warning
     #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
-          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000), conflicts_with_all = ON_NO_GRID)]
     certify_seconds: u64,
     #[command(flatten)]
     error: ErrorFlags,
@@ -83,7 +98,8 @@ pub struct Discretize {
     /// Report what the surface's file holds and make no points
     #[arg(
         long,
-        conflicts_with_all = ["holes", "certify", "certify_seconds", "max_deviation", "poisson", "out", "error"]
+        conflicts_with_all = OF_A_GRID,
+        conflicts_with_all = ON_NO_GRID
     )]
     pub(super) inspect: bool,
     /// With --inspect: report and draw where the part lies over this design's array and workspace
@@ -91,12 +107,14 @@ pub struct Discretize {
         long,
         hide_short_help = true,
         value_name = "DESIGN",
-        requires = "inspect"
+        requires = "inspect",
+        conflicts_with_all = OF_A_GRID,
+        conflicts_with_all = ON_NO_GRID
     )]
     pub(super) over: Option<FileArgument>,
     /// Draw heights, what each point is, and the deviation between them (.svg, .png
     /// or .pdf)
-    #[arg(long, value_name = "FILE", value_parser = values::picture, conflicts_with_all = ["max_deviation", "poisson"])]
+    #[arg(long, value_name = "FILE", value_parser = values::picture, conflicts_with_all = ON_NO_GRID)]
     pub(super) plot: Option<FileArgument>,
     #[command(flatten)]
     pub(super) writing: Writing,

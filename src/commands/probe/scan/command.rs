@@ -25,6 +25,9 @@ const HEADER: &str = "x_m,y_m,z_m,";
 /// Explanations beyond this many are in the JSON object alone.
 const EXPLANATIONS: usize = 8;
 
+/// Arguments of points, which a scan takes the place of.
+const OF_POINTS: [&str; 3] = ["points", "components", "magnet_force"];
+
 /// A measured scan in the points' place.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "A measured scan")]
@@ -34,16 +37,19 @@ pub struct ScanFlags {
     pub compare: Option<FileArgument>,
     /// Parameters to fit: any of scale, background, position, rotation
     #[arg(long, hide_short_help = true, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "compare",
-          default_values = ["scale", "background", "position"])]
+          conflicts_with_all = OF_POINTS, default_values = ["scale", "background", "position"])]
     fit: Vec<What>,
     /// The sensor's noise in tesla, where known: errors and residuals are held against it
-    #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::noise, requires = "compare")]
+    #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::noise, requires = "compare",
+          conflicts_with_all = OF_POINTS)]
     noise_t: Option<f64>,
     /// The noise of measured gradients in T/m
-    #[arg(long, hide_short_help = true, value_name = "G", value_parser = values::noise, requires = "compare")]
+    #[arg(long, hide_short_help = true, value_name = "G", value_parser = values::noise, requires = "compare",
+          conflicts_with_all = OF_POINTS)]
     noise_t_per_m: Option<f64>,
     /// Draw measured over computed values, and the residuals beside their noise (.svg, .png or .pdf)
-    #[arg(long, hide_short_help = true, value_name = "FILE", value_parser = values::picture, requires = "compare", conflicts_with = "points")]
+    #[arg(long, hide_short_help = true, value_name = "FILE", value_parser = values::picture, requires = "compare",
+          conflicts_with_all = OF_POINTS)]
     plot: Option<FileArgument>,
 }
 
