@@ -367,9 +367,17 @@ fn a_mesh_counts_as_the_body_that_it_bounds() {
     let results = [MESH, by_sides].map(|body| evaluated(&place, &format!("{CORE}{body}")));
     let [mesh, sides] = results.each_ref().map(inductance_h);
     let alone = inductance_h(&ALONE);
+    let stated = |result: &Value| {
+        let accuracy = &result["accuracy"]["mutual_inductance"];
+        accuracy["estimate"].as_f64().unwrap()
+    };
+    let [off, stated] = [
+        (mesh / sides - 1.0).abs(),
+        stated(&results[0]) + stated(&results[1]),
+    ];
     assert!(
-        (mesh / sides - 1.0).abs() < 1e-4 && mesh > 1.02 * alone,
-        "{mesh} {sides} {alone}"
+        off <= stated && stated < 1e-2 && mesh > 1.02 * alone,
+        "{mesh} {sides} {alone} {stated}"
     );
     let peaks = results.map(|r| r["array"]["iron"]["peak_field_t"].as_f64().unwrap());
     assert!((peaks[0] / peaks[1] - 1.0).abs() < 0.05, "{peaks:?}");
