@@ -563,6 +563,15 @@ impl Iron {
 
     /// Its mirrored part at one of the [`RESOLUTIONS`].
     pub(super) fn surface(&self, tier: usize) -> Surface {
+        self.cut(tier, self.windings.as_ref())
+    }
+
+    /// The same for other sources than the windings.
+    pub(super) fn surface_for_magnets(&self, tier: usize) -> Surface {
+        self.cut(tier, None)
+    }
+
+    fn cut(&self, tier: usize, windings: Option<&Windings>) -> Surface {
         let (order, levels, along) = RESOLUTIONS[tier];
         let resolution = Resolution {
             order,
@@ -570,7 +579,7 @@ impl Iron {
             levels,
             panel_m: self.largest_m / along,
         };
-        Surface::new(self.part(), &resolution, self.windings.as_ref())
+        Surface::new(self.part(), &resolution, windings)
     }
 }
 

@@ -38,7 +38,7 @@ struct Answer {
 impl Answer {
     /// `None` where the equations have no solution.
     fn new(iron: &Iron, tier: usize) -> Option<Self> {
-        let surface = iron.surface(tier);
+        let surface = iron.surface_for_magnets(tier);
         let images = iron.images();
         let system = System::new(iron, &surface, &images, 0.0, usize::MAX)
             .ok()?
@@ -121,7 +121,7 @@ impl IronPull {
         let images = iron.images().len();
         // Entries and their factors are held at once.
         let fits = |tier: &usize| {
-            let size = iron.surface(*tier).size();
+            let size = iron.surface_for_magnets(*tier).size();
             2 * images * size.pow(2) <= MOST_ENTRIES
         };
         let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
