@@ -12,7 +12,7 @@ use miette::{
 use super::message_text::{commands, escaped, shown_path, visible};
 
 /// Faults beyond this many are counted, not shown.
-const SHOWN_MAX: usize = 100;
+pub(super) const SHOWN_MAX: usize = 100;
 
 /// A source with a longer line is never quoted (bytes).
 const QUOTED_LINE_MAX: usize = 1000;

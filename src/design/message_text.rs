@@ -115,17 +115,8 @@ pub fn nearest<'n>(text: &str, names: &[&'n str]) -> Option<&'n str> {
     if text.len() > 2 * QUOTED_MAX {
         return None;
     }
-    let text = text.to_lowercase();
-    let length = text.chars().count();
-    // Every letter that one has more counts as one that differs.
-    let may_be_near = |name: &str| {
-        let other = name.chars().count();
-        length.min(other) as f64 >= NEAR * length.max(other) as f64
-    };
-    let likeness = |name: &str| strsim::normalized_damerau_levenshtein(&text, name);
-    let scored = (names.iter())
-        .filter(|name| may_be_near(name))
-        .map(|name| (likeness(name), *name));
+    let likeness = |name: &str| strsim::normalized_damerau_levenshtein(&text.to_lowercase(), name);
+    let scored = names.iter().map(|name| (likeness(name), *name));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (best.0 >= NEAR).then_some(best.1)
 }

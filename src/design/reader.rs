@@ -14,7 +14,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
+use super::diagnostics::{Fault, Faults, InvalidDocument, SHOWN_MAX, Severity};
 use super::key::{Accepts, Assumed, Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
@@ -320,11 +320,18 @@ impl<'a> Section<'a> {
     /// Refuses the keys that were never queried.
     pub fn finish(self) {
         let Some(table) = self.table else { return };
-        for key in table.keys() {
-            let name: &str = key.get_ref();
-            if !self.known.contains(&name) {
-                self.sink.add(self.unknown(name).at(&key.span()));
-            }
+        let keys = table.keys();
+        let mut unknown: Vec<_> = keys
+            .filter(|key| !self.known.contains(&&**key.get_ref()))
+            .collect();
+        unknown.sort_by_key(|key| key.span().start);
+        for (number, key) in unknown.into_iter().enumerate() {
+            let fault = self.unknown(key.get_ref()).at(&key.span());
+            // Faults are shown in this order; advice takes far longer than the rest.
+            self.sink.add(match number < SHOWN_MAX {
+                true => fault.help(self.advice(key.get_ref())),
+                false => fault,
+            });
         }
     }
 
@@ -334,14 +341,18 @@ impl<'a> Section<'a> {
         } else {
             format!("[{}]", self.path)
         };
-        let fault = Fault::error(
+        Fault::error(
             self.path_of(&escaped(name, QUOTED_MAX)),
             format!("unknown key {} in {place}", quoted(name)),
-        );
-        fault.help(match nearest(name, &self.known) {
+        )
+    }
+
+    /// What an unknown key may have been meant to be.
+    fn advice(&self, name: &str) -> String {
+        match nearest(name, &self.known) {
             Some(near) => format!("did you mean {near}?"),
             None => format!("known here: {}", self.known.join(", ")),
-        })
+        }
     }
 
     pub(super) fn found(&mut self, key: &'static str) -> Option<ValueRef<'a>> {

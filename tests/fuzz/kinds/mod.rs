@@ -13,8 +13,7 @@ const MIB: f64 = 1_048_576.0;
 pub const fn limits(bytes_per_byte: f64, mib: f64) -> Limits {
     Limits {
         seconds_per_mb: 2.0,
-        // Several times what the slowest takes, as other work may share the processor.
-        seconds: 8.0,
+        seconds: 2.0,
         bytes_per_byte,
         bytes: mib * MIB,
     }
