@@ -261,7 +261,52 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
     }
 }
 
+/// What the bundles hold that every loader is held to.
+pub const SAMPLES: [&str; 12] = [
+    "upright",
+    "upright with pull",
+    "tilted with pull",
+    "short axes with pull",
+    "upright vector",
+    "tilted vector with pull",
+    "upright uncertain with pull",
+    "upright uncertain vector",
+    "tilted vector with pull, uncertain",
+    // Broke: currents chosen for uncertainties had a larger sum, and coils without force kept the
+    // others from the nearest one.
+    "upright uncertain with pull, reversing, a small sum",
+    "upright vector, reversing",
+    "upright vector, two idle, reversing, a small sum",
+];
+
 impl Sample {
+    /// The sample of a bundle with what the name says.
+    pub fn named(name: &str) -> Self {
+        let with = |what: &str| name.contains(what);
+        let samples = match (with("short axes"), with("tilted")) {
+            (true, _) => [2, 3, 1],
+            (_, true) => [13, 9, 11],
+            _ => [13, 17, 11],
+        };
+        let mut made = sample(with("tilted"), samples);
+        if with("pull") {
+            made = made.with_pull();
+        }
+        if with("vector") {
+            made = made.with_vectors();
+        }
+        if with("uncertain") {
+            made = made.with_uncertainty(if with("pull") { 0.004 } else { 0.0 });
+        }
+        if with("two idle") {
+            made = made.without_force(1);
+        }
+        if with("reversing") {
+            made = made.reversing(with("small sum").then_some(0.4));
+        }
+        made
+    }
+
     /// The sample of a bundle that holds the unpowered steel's pull too.
     pub fn with_pull(mut self) -> Self {
         let map = &self.map;
