@@ -174,7 +174,8 @@ static size_t head_at(const archive *a, size_t at, size_t end)
     return end - at < step ? 0 : step;
 }
 
-/* An entry's bytes, stored as they are between the file's start and the directory. */
+/* An entry's bytes, stored as they are between the file's start and the directory, under the name that the
+ * directory has for them: a damaged name would hide an array. */
 static int entry_at(const archive *a, size_t at, const unsigned char **data, size_t *size)
 {
     const unsigned char *head = a->data + at;
@@ -186,6 +187,8 @@ static int entry_at(const archive *a, size_t at, const unsigned char **data, siz
     begin = (size_t)30 + u16(a->data + local + 26) + u16(a->data + local + 28);
     if (a->directory - local < begin || a->directory - local - begin < stored)
         return fail(a, "", "an entry lies outside the file");
+    if (u16(a->data + local + 26) != u16(head + 28) || memcmp(a->data + local + 30, head + 46, u16(head + 28)) != 0)
+        return fail(a, "", "an entry has another name in the directory");
     *data = a->data + local + begin;
     *size = stored;
     return 0;
@@ -198,8 +201,8 @@ static int same_name(const archive *a, size_t at, size_t other)
 }
 
 /* All loaders accept the same archives: the directory fills the file from the last entry to an end
- * record without a comment, and every entry is stored as it is, undamaged, its name there once (of
- * two, other programs may read the other one). */
+ * record without a comment, and every entry is stored as it is, undamaged, its name the same in both
+ * places and there once (of two, other programs may read the other one). */
 static int check_archive(archive *a)
 {
     size_t end, at, other, step;

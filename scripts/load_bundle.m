@@ -1016,6 +1016,9 @@ function map = read_npz(path)
         if ~isequal(mark, [80, 75, 3, 4]) || local + 30 + sum(skip) + size_bytes > directory
             error('fluxform:bundle', '%s: %s lies outside the file', path, name);
         end
+        if ~isequal(fread(file, [1, skip(1)], 'uint8=>char'), name)
+            error('fluxform:bundle', '%s: %s has another name in the directory', path, name);
+        end
         key = regexprep(name, '\.npy$', '');
         if ~any(strcmp(key, names)) || strcmp(key, name)
             continue

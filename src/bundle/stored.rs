@@ -1,9 +1,9 @@
 //! The one form of zip archive that all loaders of bundles accept.
 //!
 //! The directory fills the file from the last entry to an end record without a comment; every entry
-//! is stored as it is, undamaged, its name there once. Of two entries of one name, or of two
-//! directories, other programs might read the other one. Nothing is copied or allocated by what
-//! the archive claims.
+//! is stored as it is, undamaged, its name the same in both places and there once. Of two entries
+//! of one name, or of two directories, other programs might read the other one; a damaged name
+//! would hide an array. Nothing is copied or allocated by what the archive claims.
 
 use std::collections::BTreeMap;
 
@@ -57,7 +57,7 @@ pub(super) fn entries(bytes: &[u8]) -> Result<BTreeMap<&[u8], &[u8]>, String> {
         let (name, step) = name_of(heads).ok_or_else(damaged)?;
         let (head, rest) = heads.split_at(step);
         heads = rest;
-        let content = content_of(data, head)
+        let content = content_of(data, head, name)
             .map_err(|message| format!("{} {message}", String::from_utf8_lossy(name)))?;
         if entries.insert(name, content).is_some() {
             let name = String::from_utf8_lossy(name);
@@ -80,8 +80,8 @@ fn name_of(heads: &[u8]) -> Option<(&[u8], usize)> {
     Some((heads.get(HEAD_BYTES..HEAD_BYTES + name)?, step))
 }
 
-/// The bytes of an entry whose part of the directory is `head`.
-fn content_of<'a>(data: &'a [u8], head: &[u8]) -> Result<&'a [u8], &'static str> {
+/// The bytes of the entry `name` whose part of the directory is `head`.
+fn content_of<'a>(data: &'a [u8], head: &[u8], name: &[u8]) -> Result<&'a [u8], &'static str> {
     let plain = u16_at(head, 10) == Some(0) && u16_at(head, 8).is_some_and(|flags| flags & 1 == 0);
     if !plain || u32_at(head, 20) != u32_at(head, 24) {
         return Err("is compressed, encrypted or larger than 4 GiB, expected stored as it is");
@@ -90,10 +90,15 @@ fn content_of<'a>(data: &'a [u8], head: &[u8]) -> Result<&'a [u8], &'static str>
         let size = place_at(head, 24)?;
         let local = data.get(place_at(head, 42)?..)?;
         (u32_at(local, 0)? == LOCAL_MARK).then_some(())?;
-        let begin = LOCAL_BYTES + u16_at(local, 26)? + u16_at(local, 28)?;
-        local.get(begin..begin.checked_add(size)?)
+        let named = LOCAL_BYTES + u16_at(local, 26)?;
+        let begin = named + u16_at(local, 28)?;
+        let content = local.get(begin..begin.checked_add(size)?)?;
+        Some((&local[LOCAL_BYTES..named], content))
     };
-    let content = found().ok_or("lies outside the file")?;
+    let (own_name, content) = found().ok_or("lies outside the file")?;
+    if own_name != name {
+        return Err("has another name in the directory");
+    }
     if Some(crc32fast::hash(content)) == u32_at(head, 16) {
         Ok(content)
     } else {

@@ -104,6 +104,17 @@ impl Archive {
         head[16..20].copy_from_slice(&sum);
     }
 
+    /// Where the entry's own header begins.
+    fn local(&self, entry: usize) -> usize {
+        let at = &self.heads[entry][42..46];
+        u32::from_le_bytes(at.try_into().unwrap()) as usize
+    }
+
+    /// Another name in the directory alone.
+    fn rename(&mut self, entry: usize) {
+        self.heads[entry][46] = b'q';
+    }
+
     fn twice(&mut self, entry: usize) {
         self.heads.push(self.heads[entry].clone());
         self.count += 1;
@@ -116,8 +127,16 @@ const DAMAGES: &[Damage] = &[
     ("an array twice", |a| a.twice(5)),
     ("the first array twice", |a| a.twice(0)),
     ("an unknown array twice", |a| {
-        a.heads[3][46] = b'q';
+        a.rename(3);
+        let own = a.local(3) + 30;
+        a.data[own] = b'q';
         a.twice(3);
+    }),
+    // Broke: C read a bundle without the limit of the sum.
+    ("another name in the directory", |a| {
+        let named = |head: &Vec<u8>| head[46..].starts_with(b"total_current_max_a.npy");
+        let entry = a.heads.iter().position(named).unwrap();
+        a.rename(entry);
     }),
     ("a comment", |a| a.behind = b"made by hand".to_vec()),
     ("one entry less", |a| a.count -= 1),

@@ -680,7 +680,8 @@ def _array(name, data):
 def _entries(content):
     """Names and bytes of an archive's entries, the one form that all loaders accept: the directory
     fills the file from the last entry to an end record without a comment, and every entry is stored
-    as it is, undamaged, its name there once (of two, other programs may read the other one)."""
+    as it is, undamaged, its name the same in both places and there once (of two, other programs may
+    read the other one)."""
     end = len(content) - 22
     if end < 0 or content[end : end + 4] != b"PK\x05\x06" or content[-2:] != b"\0\0":
         raise BundleError("map.npz: not a zip archive, cut short, or with bytes behind its end")
@@ -705,9 +706,12 @@ def _entries(content):
             raise BundleError(f"map.npz: {name!r} is compressed, encrypted or larger than 4 GiB")
         if directory - local < 30 or content[local : local + 4] != b"PK\x03\x04":
             raise BundleError(f"map.npz: {name!r} lies outside the file")
-        begin = local + 30 + sum(struct.unpack_from("<HH", content, local + 26))
+        local_lengths = struct.unpack_from("<HH", content, local + 26)
+        begin = local + 30 + sum(local_lengths)
         if begin + size > directory:
             raise BundleError(f"map.npz: {name!r} lies outside the file")
+        if content[local + 30 : local + 30 + local_lengths[0]] != name:
+            raise BundleError(f"map.npz: {name!r} has another name in the directory")
         data = content[begin : begin + size]
         if zlib.crc32(data) != crc:
             raise BundleError(f"map.npz: {name!r} is damaged (CRC)")
