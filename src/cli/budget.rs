@@ -152,36 +152,71 @@ fn within(cost: &Cost) -> Result<(), String> {
     ))
 }
 
-/// Bytes that this process may still take: the least of the machine's free memory, the limit of its
-/// control group and that of the process.
+/// What the system says of the memory of control groups, of both of its versions: their folder, how
+/// the line of this process's group in `/proc/self/cgroup` begins behind its number, the files of the
+/// limit and of what is used, and the key of what is a mere copy of files.
+const GROUPS: [[&str; 5]; 2] = [
+    [
+        "/sys/fs/cgroup",
+        ":",
+        "memory.max",
+        "memory.current",
+        "inactive_file",
+    ],
+    [
+        "/sys/fs/cgroup/memory",
+        "memory:",
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        "total_inactive_file",
+    ],
+];
+
+/// Bytes that the control groups leave, this process's own and those around it; copies of files in
+/// memory go where it is needed. In a container the own group's path may be the machine's, not there.
+fn left_in_groups(read: impl Fn(&Path) -> Option<String>) -> Option<f64> {
+    let memberships = read(Path::new("/proc/self/cgroup")).unwrap_or_default();
+    let of = |[folder, line, limit, used, copies]: [&str; 5]| {
+        let own = memberships.lines().find_map(|membership| {
+            let (_, group) = membership.split_once(':')?;
+            group.strip_prefix(line)?.strip_prefix('/')
+        });
+        let own = Path::new(folder).join(own.unwrap_or_default());
+        let inside = own
+            .ancestors()
+            .take_while(|group| group.starts_with(folder));
+        let left = inside.filter_map(|group| {
+            let number = |file: &str| read(&group.join(file))?.trim().parse::<f64>().ok();
+            let (limit, used) = (number(limit)?, number(used)?);
+            let stat = read(&group.join("memory.stat")).unwrap_or_default();
+            let copied = stat.lines().find_map(|line| {
+                let (key, bytes) = line.split_once(' ')?;
+                (key == copies).then(|| bytes.parse::<f64>().ok())?
+            });
+            Some((limit - used + copied.unwrap_or(0.0)).clamp(0.0, limit))
+        });
+        left.reduce(f64::min)
+    };
+    GROUPS.into_iter().filter_map(of).reduce(f64::min)
+}
+
+/// Bytes that this process may still take: the least of the machine's free memory, the limits of its
+/// control groups and that of the process.
 fn available_bytes() -> f64 {
     let machine = || {
-        let text = read("/proc/meminfo")?;
+        let text = read(Path::new("/proc/meminfo"))?;
         let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
         let kibibytes: f64 = line.split_whitespace().next()?.parse().ok()?;
         Some(1024.0 * kibibytes)
     };
     let process = || {
-        let text = read("/proc/self/limits")?;
+        let text = read(Path::new("/proc/self/limits"))?;
         let line = text
             .lines()
             .find_map(|l| l.strip_prefix("Max address space"))?;
         line.split_whitespace().next()?.parse::<f64>().ok()
     };
-    let group = |limit: &str, used: &str| {
-        let limit: f64 = read(limit)?.trim().parse().ok()?;
-        let used: f64 = read(used)?.trim().parse().ok()?;
-        Some((limit - used).max(0.0))
-    };
-    let found = [
-        machine(),
-        process(),
-        group("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-        group(
-            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-        ),
-    ];
+    let found = [machine(), process(), left_in_groups(read)];
     let least = found.into_iter().flatten().fold(f64::INFINITY, f64::min);
     if least.is_finite() {
         least
@@ -190,8 +225,8 @@ fn available_bytes() -> f64 {
     }
 }
 
-fn read(path: &str) -> Option<String> {
-    std::fs::read_to_string(Path::new(path)).ok()
+fn read(path: &Path) -> Option<String> {
+    std::fs::read_to_string(path).ok()
 }
 
 #[cfg(test)]
@@ -216,6 +251,35 @@ mod tests {
             "this will take about 2 min, most of it other (1 min and 3 GB); use less; Ctrl-C stops it"
         );
         assert_eq!(duration(&[], 1), None);
+    }
+
+    /// Broke: copies of files counted as used, and only the outermost group's limit was known.
+    #[test]
+    fn control_groups_leave_what_their_limits_and_files_say() {
+        let files = [
+            ("memory.max", "8000\n"),
+            ("memory.current", "7999\n"),
+            ("memory.stat", "anon 300\nfile 7600\ninactive_file 7500\n"),
+            ("job/memory.max", "6000\n"),
+            ("job/memory.current", "500\n"),
+            ("job/own/memory.max", "max\n"),
+            ("job/own/memory.current", "400\n"),
+            ("memory/old/memory.limit_in_bytes", "900\n"),
+            ("memory/old/memory.usage_in_bytes", "200\n"),
+        ];
+        let left = |memberships: &str| {
+            left_in_groups(|path| {
+                let Ok(file) = path.strip_prefix("/sys/fs/cgroup") else {
+                    return Some(memberships.to_owned());
+                };
+                let found = files.iter().find(|(name, _)| Path::new(name) == file);
+                found.map(|(_, text)| (*text).to_owned())
+            })
+        };
+        assert_eq!(left("0::/\n"), Some(7501.0));
+        assert_eq!(left("0::/job/own\n"), Some(5500.0));
+        assert_eq!(left("0::/of/the/machine\n"), Some(7501.0));
+        assert_eq!(left("7:cpu:/\n4:memory:/old\n"), Some(700.0));
     }
 
     #[test]
