@@ -48,6 +48,9 @@ pub fn listen(common: &Common) {
             .and_then(|_| flag::register(signal, stop_flag()))
             .and_then(|_| flag::register(signal, Arc::clone(&ENDS)));
     }
+    // What `ulimit -f` forbids is then a write that fails, not the end of the process.
+    #[cfg(unix)]
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let common = common.clone();
     thread::spawn(move || guard(&common));
 }

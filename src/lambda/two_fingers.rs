@@ -42,7 +42,7 @@ pub struct TwoFingers {
     pub lambda_n_per_m: f64,
     /// Distances of the two fingers, m.
     pub apart_m: [f64; 2],
-    /// Random pairs of points so far apart; 0 where the object has none.
+    /// Random pairs of points so far apart, the magnets beside each other; 0 where the object has none.
     pub pairs: usize,
     /// Share of them at which both get their upward force.
     pub upward_share: f64,
@@ -70,6 +70,31 @@ pub fn between_magnets_n(moment_a_m2: [f64; 3], from_first_m: [f64; 3]) -> [f64;
     })
 }
 
+/// The magnets of both fingers, alike and upright.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FingerMagnet {
+    /// Moment, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// Diameter, m.
+    pub diameter_m: f64,
+    /// Length, m.
+    pub length_m: f64,
+}
+
+impl FingerMagnet {
+    /// Whether two of them, `apart_m` from centre to centre, would lie in each other.
+    #[must_use]
+    pub fn overlaps(&self, [x, y, z]: [f64; 3]) -> bool {
+        x.hypot(y) < self.diameter_m && z.abs() < self.length_m
+    }
+
+    /// Below this distance they always do, m.
+    #[must_use]
+    pub fn closest_m(&self) -> f64 {
+        self.diameter_m.min(self.length_m)
+    }
+}
+
 /// The result of one pair.
 struct Pair {
     given: [bool; 2],
@@ -78,7 +103,7 @@ struct Pair {
     magnets_share: f64,
 }
 
-/// Random pairs of the points at `positions_m`, `apart_m` apart, under magnets of one moment.
+/// Random pairs of the points at `positions_m`, `apart_m` apart, at which the magnets do not overlap.
 ///
 /// # Errors
 /// Where the problem is malformed.
@@ -88,12 +113,13 @@ struct Pair {
 pub fn two_fingers(
     problem: &VectorProblem,
     positions_m: &[[f64; 3]],
-    moment_a_m2: [f64; 3],
+    magnet: FingerMagnet,
     lambda_n_per_m: f64,
     apart_m: [f64; 2],
 ) -> Result<TwoFingers, FeedbackError> {
     problem.upward.validate(&Settings::default())?;
-    let pairs = random_pairs(positions_m, apart_m);
+    let pairs = random_pairs(positions_m, &magnet, apart_m);
+    let moment_a_m2 = magnet.moment_a_m2;
     let done: Vec<Pair> = pairs
         .par_iter()
         .map(|pair| {
@@ -144,7 +170,11 @@ pub fn allocate(limits: &ForceProblem, rows: &[(&[f64], f64)], currents_a: &mut 
     form.value(currents_a).sqrt()
 }
 
-fn random_pairs(positions_m: &[[f64; 3]], [least_m, most_m]: [f64; 2]) -> Vec<[usize; 2]> {
+fn random_pairs(
+    positions_m: &[[f64; 3]],
+    magnet: &FingerMagnet,
+    [least_m, most_m]: [f64; 2],
+) -> Vec<[usize; 2]> {
     let mut random = Random::new(SEED);
     let points = positions_m.len();
     let mut pairs = Vec::new();
@@ -155,7 +185,7 @@ fn random_pairs(positions_m: &[[f64; 3]], [least_m, most_m]: [f64; 2]) -> Vec<[u
         let pair = [random.below(points), random.below(points)];
         let between = between(positions_m, pair);
         let distance = dot(between, between).sqrt();
-        if distance > 0.0 && (least_m..=most_m).contains(&distance) {
+        if (least_m..=most_m).contains(&distance) && !magnet.overlaps(between) {
             pairs.push(pair);
         }
     }

@@ -42,6 +42,7 @@ use crate::field::source::AxialSource;
 use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
 use crate::heating::Heating;
+use crate::lambda::two_fingers::FingerMagnet;
 use crate::lambda::uncertainty::Turned;
 use crate::map::tabulate::PlacedCoil;
 use crate::numerics::vec3::{cross, dot};
@@ -60,6 +61,15 @@ const PORTION: usize = 4096;
 pub(crate) const MAGNET_SHARE: f64 = 0.3;
 /// Share of the tolerance given to the windings' field where the magnet takes its own.
 pub(crate) const AIR_SHARE: f64 = 0.6;
+
+/// The magnet, as two fingers wear it.
+pub fn finger_magnet(design: &Design) -> FingerMagnet {
+    FingerMagnet {
+        moment_a_m2: moment_a_m2(design),
+        diameter_m: design.magnet.diameter_m,
+        length_m: design.magnet.length_m,
+    }
+}
 
 /// The magnet's moment, A m^2.
 pub fn moment_a_m2(design: &Design) -> [f64; 3] {

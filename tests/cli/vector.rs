@@ -91,8 +91,34 @@ fn two_fingers_are_somewhere_else_and_get_their_share() {
     run("two_way.toml", "0,50mm")
         .ends(2)
         .says(&["cannot be in the same place"]);
+    // Broke: magnets that lie in each other pushed each other by 389 N.
+    run("two_way.toml", "5mm,8mm")
+        .ends(3)
+        .says(&["10 mm wide and 10 mm long overlap"]);
     let none = run("two_way.toml", "30cm,40cm").ends(0).json();
     assert_eq!(none["feedback"]["two_fingers"]["pairs"], 0);
+}
+
+/// Broke: the size was passed over in silence.
+#[test]
+fn a_size_along_the_normal_needs_a_force_along_it() {
+    let place = Place::new();
+    let given = |command: &str, more: &[&str]| {
+        let args = [
+            command,
+            SEED,
+            "shapes/flat.toml",
+            "--normal-force",
+            "upward",
+        ];
+        place.run(&[&args[..], more].concat())
+    };
+    for command in ["lambda", "calibrate"] {
+        given(command, &[])
+            .ends(3)
+            .says(&["add --force-direction normal"]);
+    }
+    given("lambda", &["--force-direction", "normal"]).ends(0);
 }
 
 #[test]

@@ -107,7 +107,7 @@ pub fn small_disk(prepared: &Prepared, steps: usize, random: &mut Random) -> Res
     Ok(row)
 }
 
-/// Files may not grow beyond a limit.
+/// Files may not grow beyond a limit, whose signal ended the program once.
 pub fn file_limit(prepared: &Prepared, steps: usize, random: &mut Random) -> Result<Row, String> {
     // A failed write to the cache is silent: the next run computes the value again.
     let artefacts = prepared
@@ -122,7 +122,7 @@ pub fn file_limit(prepared: &Prepared, steps: usize, random: &mut Random) -> Res
         let place = prepared.fresh();
         let mut command = Command::new("sh");
         command
-            .args(["-c", "trap '' XFSZ; ulimit -f $1; shift; exec \"$@\"", "sh"])
+            .args(["-c", "ulimit -f $1; shift; exec \"$@\"", "sh"])
             .arg(blocks.to_string())
             .arg(program())
             .args(prepared.scenario.args);

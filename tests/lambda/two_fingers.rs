@@ -2,7 +2,7 @@
 
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_lambda::ForceProblem;
-use fluxform_lambda::two_fingers::{TwoFingers, between_magnets_n, two_fingers};
+use fluxform_lambda::two_fingers::{FingerMagnet, TwoFingers, between_magnets_n, two_fingers};
 use fluxform_lambda::vector_feedback::VectorProblem;
 
 /// m . B of one dipole in the field of another one, J.
@@ -57,7 +57,12 @@ fn pairs(upper_a: f64, moment: [f64; 3], apart_m: [f64; 2]) -> TwoFingers {
         sides_n_per_a: [&axes[0], &axes[1]],
         direction: &[[0.0, 0.0, 1.0]; 4],
     };
-    two_fingers(&problem, &positions, moment, 3.0, apart_m).unwrap()
+    let magnet = FingerMagnet {
+        moment_a_m2: moment,
+        diameter_m: 0.01,
+        length_m: 0.01,
+    };
+    two_fingers(&problem, &positions, magnet, 3.0, apart_m).unwrap()
 }
 
 #[test]

@@ -225,8 +225,12 @@ fn named(shape: &ShapeBench, cheapest: &Cheapest) -> String {
     let verdict = if cheapest.met {
         String::new()
     } else {
+        let own = shape.reference.lambda_error.filter(|own| *own > 0.0);
+        let own = own.map_or_else(String::new, |own| {
+            format!(", and the refined run by up to {}", percent(own))
+        });
         format!(
-            "not reached; the closest is off by {}: ",
+            "not reached; the closest is off by {}{own}: ",
             percent(run.error())
         )
     };

@@ -142,6 +142,7 @@ impl Calibrate {
             &self.surface,
             printer,
         )?;
+        lambda.check_force(shapes.iter().map(|shape| &shape.document))?;
         let design = &document.design;
         let source = DesignSource {
             design,

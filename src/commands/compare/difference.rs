@@ -5,7 +5,8 @@
 //! ```
 //!
 //! with w the just-noticeable relative difference and F_0 the smallest force that is felt at all.
-//! Symmetric in both; where one force vanishes and the other is strong, d = 1/w, the most there is.
+//! Symmetric in both; where one force vanishes and the other is strong, d = 1/w; opposite forces differ by up
+//! to 2/w, the most there is.
 
 use crate::numerics::vec3::{dot, plus};
 use crate::units::DETECTION_THRESHOLD_N;

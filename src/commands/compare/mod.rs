@@ -115,7 +115,7 @@ pub struct Pair {
     pub b: String,
     /// Largest difference with static currents, in just-noticeable differences.
     pub static_jnd: Option<f64>,
-    /// Largest difference with position feedback, in just-noticeable differences; at most 1/jnd.
+    /// Largest difference with position feedback, in just-noticeable differences; at most 2/jnd.
     pub feedback_jnd: Option<f64>,
     /// Root mean square of the differences with static currents, each surface counting half.
     pub static_rms_jnd: Option<f64>,

@@ -212,6 +212,7 @@ impl Lambda {
             &self.surface,
             printer,
         )?;
+        options.check_force(shapes.iter().map(|shape| &shape.document))?;
         let design = &document.design;
         let force = self.writing.force;
         let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));

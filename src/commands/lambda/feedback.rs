@@ -16,7 +16,7 @@ use crate::lambda::vector_static::{VectorStatic, sideways_weight, vector_static}
 use crate::lambda::{ForceProblem, OperatingPoint, Rewired};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::passive;
+use crate::scene::{finger_magnet, passive};
 use crate::units::DIRECTION_JND_DEG;
 
 use super::PosedProblem;
@@ -335,7 +335,7 @@ impl PosedProblem<'_> {
     /// Pairs of points under two fingers, where they are requested and there is a force constant.
     ///
     /// # Errors
-    /// Places that cannot be computed; interruption.
+    /// Distances at which the magnets overlap; places that cannot be computed; interruption.
     fn two_fingers(
         &self,
         requested: Option<([f64; 2], &OperatingPoint)>,
@@ -344,11 +344,19 @@ impl PosedProblem<'_> {
         let Some((apart_m, chosen)) = requested else {
             return Ok(None);
         };
+        let magnet = finger_magnet(self.scene.design);
+        if apart_m[1] < magnet.closest_m() {
+            let [most, wide, long] =
+                [apart_m[1], magnet.diameter_m, magnet.length_m].map(|length_m| length_m * 1e3);
+            return Err(RunError::Input(format!(
+                "--two-fingers: at most {most} mm apart, magnets {wide} mm wide and {long} mm long overlap"
+            )));
+        }
         let wired = WiredVectors::new(self, progress)?;
         let found = two_fingers(
             &wired.problem(self),
             &self.points.positions_m,
-            self.scene.moment_a_m2,
+            magnet,
             chosen.lambda_n_per_m,
             apart_m,
         );

@@ -158,6 +158,22 @@ impl LambdaOptions {
         }
     }
 
+    /// # Errors
+    /// A size along the normal where no object's force points along it.
+    pub(crate) fn check_force<'a>(
+        &self,
+        mut documents: impl Iterator<Item = &'a ShapeDocument>,
+    ) -> Result<(), RunError> {
+        let along = |document: &ShapeDocument| self.force.over(document.force).along_normal();
+        if self.force.normal_force.is_none() || documents.any(|d| along(d).is_some()) {
+            return Ok(());
+        }
+        Err(RunError::Input(
+            "--normal-force: no object's force points along its normal; add --force-direction normal"
+                .to_owned(),
+        ))
+    }
+
     /// These options, the force being the document's where they request none.
     fn over(&self, document: &ShapeDocument) -> Self {
         Self {

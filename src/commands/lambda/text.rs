@@ -204,7 +204,9 @@ fn vector_lines(sheet: &mut Sheet, file: &VectorFeedbackFile, at_chosen: Option<
 fn two_fingers(of: &TwoFingers) -> String {
     let [from, to] = of.apart_m.map(mm);
     if of.pairs == 0 {
-        return format!("the object has no two points {from} to {to} apart");
+        return format!(
+            "the object has no two points {from} to {to} apart at which two magnets do not overlap"
+        );
     }
     format!(
         "of {} {from} to {to} apart, at {} N/m: both get their upward force at {}, for {} W; their vector at {}, \

@@ -23,10 +23,11 @@ use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::commands::calibrate::DESIGN_FILE;
-use crate::design::{Design, Driver, Magnet, Need};
+use crate::design::{Design, Driver, Need};
+use crate::lambda::two_fingers::FingerMagnet;
 use crate::numerics::vec3::dot;
 use crate::progress::Progress;
-use crate::scene::moment_a_m2;
+use crate::scene::finger_magnet;
 use felt::Felt;
 use page::Below;
 use renderer::{Renderer, RendererError, Step};
@@ -99,7 +100,7 @@ impl Opened {
     /// # Errors
     /// A bundle without a copy of its design, which has the magnets; one whose currents are chosen for
     /// uncertainties.
-    fn for_two_fingers(&self) -> Result<(Renderer, Magnet), RunError> {
+    fn for_two_fingers(&self) -> Result<(Renderer, FingerMagnet), RunError> {
         let name = self.bundle.folder.display();
         if self.renderer.setting().is_some() {
             return Err(RunError::Input(
@@ -110,9 +111,10 @@ impl Opened {
             .map_err(|error| RunError::Input(format!(
                 "{name}: two fingers push each other as their magnets do, which the bundle's design must say: {error}"
             )))?;
-        let renderer = Renderer::two_fingers(&self.bundle, moment_a_m2(&design))
+        let magnet = finger_magnet(&design);
+        let renderer = Renderer::two_fingers(&self.bundle, magnet.moment_a_m2)
             .map_err(|error| RunError::Input(format!("{name}: {error}")))?;
-        Ok((renderer, design.magnet))
+        Ok((renderer, magnet))
     }
 
     /// The bundle's files, its seconds, which no manifest lists, among them.

@@ -1,7 +1,7 @@
 //! Whether a trajectory is plausible, before a replay of it is believed.
 
 use crate::bundle::trajectory::Trajectory;
-use crate::design::Magnet;
+use crate::lambda::two_fingers::FingerMagnet;
 
 /// A time between positions longer than so many median ones is a gap.
 const GAP: f64 = 10.0;
@@ -37,13 +37,13 @@ pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
 }
 
 /// The first time at which the upright magnets of two fingers would overlap, as a sentence.
-pub(super) fn touching(trajectory: &Trajectory, magnet: &Magnet) -> Option<String> {
+pub(super) fn touching(trajectory: &Trajectory, magnet: &FingerMagnet) -> Option<String> {
     let pairs = trajectory.position_m.iter().zip(&trajectory.second_m);
-    let apart =
-        pairs.map(|([ax, ay, az], [bx, by, bz])| ((ax - bx).hypot(ay - by), (az - bz).abs()));
+    let apart = pairs.map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k]));
     let mut at = apart.zip(&trajectory.t_s);
-    at.find(|((aside, above), _)| *aside < magnet.diameter_m && *above < magnet.length_m)
-        .map(|((aside, above), t_s)| {
+    at.find(|(apart_m, _)| magnet.overlaps(*apart_m))
+        .map(|([x, y, z], t_s)| {
+            let (aside, above) = (x.hypot(y), z.abs());
             let mm = |length_m: f64| (length_m * 1e6).round() / 1e3;
             format!(
                 "at {t_s} s the two fingers are {} mm apart sideways and {} mm in height, where their magnets, {} mm \
