@@ -80,6 +80,27 @@ fn a_mesh_of_a_box_is_the_box() {
     }
 }
 
+/// Broke: of a small body turned far from the origin a panel's own nodes rounded off its plane, and its halving took all
+/// memory.
+#[test]
+fn a_small_body_is_the_same_turned_and_far_away() {
+    let size = [3.2e-3, 6.3e-3, 7.6e-3];
+    let body = |centre_m: Point, turn: [Point; 3]| Body {
+        solid: Solid::Box(size),
+        centre_m,
+        turn,
+    };
+    let (sin, cos) = 0.9_f64.sin_cos();
+    let turned = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
+    let up =
+        |body: Body| InUniformField::of(united(&[(body, 50.0)]), [0.0, 0.0, 1.0], 1).moment_m3();
+    let near = up(body([0.004, 0.005, 0.006], UPRIGHT));
+    for centre_m in [[0.2567, 0.0468, -0.02], [-17.0, 9.0, 3.0]] {
+        let far = up(body(centre_m, turned));
+        assert!(apart(far, near) < 1e-9, "{far:?} {near:?}");
+    }
+}
+
 /// An octahedron's faces halved again and again, on the unit sphere.
 fn ball(halvings: usize) -> Vec<[Point; 3]> {
     let unit = |p: Point| {

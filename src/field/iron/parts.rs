@@ -15,6 +15,11 @@ const MOST_HALVINGS: usize = 14;
 /// Nodes of the finer rule beyond the panel's own.
 const MORE_NODES: usize = 3;
 
+/// By how much coordinates like those of a place, of turned and moved bodies, may be rounded, m.
+pub(super) fn coordinate_rounding_m(place_m: Point) -> f64 {
+    64.0 * f64::EPSILON * norm(place_m)
+}
+
 /// A panel of a face and its parts so far.
 pub(super) struct Parts<'a> {
     face: &'a Face,
@@ -68,13 +73,13 @@ impl<'a> Parts<'a> {
         let part = &self.parts[number].panel;
         let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
         let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
-        // Of a plane panel nothing is left to singularities; halving ends by itself.
-        let most = if part.plane.is_none() {
-            MOST_HALVINGS
-        } else {
-            8 * MOST_HALVINGS
+        // Of a plane panel nothing is left to singularities: halving ends by itself, at the latest where
+        // the centres of both halves round to one.
+        let halved = match part.plane {
+            None => halvings < MOST_HALVINGS,
+            Some(_) => halvings < 8 * MOST_HALVINGS && half > coordinate_rounding_m(target_m),
         };
-        if distance < NEAR * half && halvings < most {
+        if distance < NEAR * half && halved {
             let first = self.halves(number);
             for half in [first, first + 1] {
                 self.visit_part(target_m, half, halvings + 1, visit);

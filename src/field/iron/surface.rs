@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
 use super::near_windings::Windings;
-use super::parts::{Halvings, Parts};
+use super::parts::{Halvings, Parts, coordinate_rounding_m};
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
@@ -119,8 +119,10 @@ impl Surface {
         let panel = &self.panels[panel];
         let away = minus(target_m, panel.centre_m);
         let distance = norm(away);
+        // What lies in the panel's plane; of a small body far from the origin as its coordinates round.
         if let Some(normal) = panel.plane
-            && dot(normal, away).abs() < 1e-12 * (distance + panel.radius_m)
+            && dot(normal, away).abs()
+                < 1e-12 * (distance + panel.radius_m) + coordinate_rounding_m(target_m)
         {
             return;
         }
