@@ -1,5 +1,6 @@
 //! A coil's geometry, circuit and limits; the best coil (eq. 11) and the best array.
 
+pub mod array_heat;
 pub mod array_search;
 pub mod circuit;
 pub mod drive;

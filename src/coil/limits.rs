@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::array_heat::Drivers;
 use super::circuit::{Circuit, turns_that_fit};
 use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
 use fluxform_design::iron::Plate;
@@ -37,7 +38,7 @@ pub enum LimitName {
     CoreField,
     /// Larger side of the rectangle that holds all coils and the plate, m.
     Footprint,
-    /// Heat of all coils at their largest currents, W.
+    /// Most heat of all coils that drivers and supply allow, W.
     ArrayPower,
     /// Heat of all coils at the static currents of the shape that takes most, W.
     StaticPower,
@@ -233,21 +234,12 @@ impl Evaluated<'_> {
         Some(of_plate.fold(side_m(0).max(side_m(1)), f64::max))
     }
 
-    /// The most heat of all coils that drivers and supply allow, W: as many coils at their largest current
-    /// as the sum allows, for heat grows with the square.
+    /// The most heat of all coils that drivers and supply allow, W.
     fn array_power_w(&self) -> f64 {
         let supply = &self.design.supply;
-        let limits = supply.current_max_a.iter().zip(&supply.current_min_a);
-        let rated = |limit_a: f64| self.circuit.rated_current_a(limit_a, supply.voltage_v);
-        let mut most_a: Vec<f64> = limits.map(|(up, down)| rated(up.max(-down))).collect();
-        most_a.sort_by(|a, b| b.total_cmp(a));
-        let mut left_a = supply.total_current_max_a.unwrap_or(f64::INFINITY);
-        let heat = most_a.into_iter().map(|most_a| {
-            let current_a = most_a.min(left_a);
-            left_a -= current_a;
-            self.circuit.power_w(current_a)
-        });
-        heat.sum()
+        let resistance_ohm = self.circuit.resistance_ohm;
+        let [heat_w, _] = Drivers::of(supply).most_heat_w(supply.voltage_v, resistance_ohm);
+        heat_w
     }
 }
 

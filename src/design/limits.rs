@@ -53,7 +53,7 @@ limits! {
     wire_length_max_m: "wire_length_max_m", si("m"), "length of the wire";
     core_field_max_t: "core_field_max_t", si("T"), "flux density in the core";
     footprint_max_m: "footprint_max_mm", MM, "larger side of the rectangle that holds all coils and the plate";
-    array_power_max_w: "array_power_max_w", si("W"), "heat of all coils at the largest currents that the supply allows";
+    array_power_max_w: "array_power_max_w", si("W"), "most heat of all coils at currents that the supply allows, in their sum too, where signs count";
     static_power_max_w: "static_power_max_w", si("W"), "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes";
     feedback_power_max_w: "feedback_power_max_w", si("W"), "mean heat of all coils over that shape with position feedback, currents of least power; known only with shapes";
     array_mass_max_kg: "array_mass_max_kg", si("kg"), "mass of all coils, cores and the plate";

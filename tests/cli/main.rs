@@ -17,6 +17,7 @@ mod messages;
 mod mistakes;
 mod optimize;
 mod optimize_array;
+mod optimize_limits;
 mod placement;
 mod scan;
 mod screen;

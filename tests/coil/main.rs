@@ -1,3 +1,4 @@
-//! A coil's circuit against direct integration and limits.
+//! A coil's circuit against direct integration and limits, and the heat of an array.
 
+mod array_heat;
 mod transient;

@@ -131,7 +131,9 @@ impl<'a> Bores<'a> {
                 true
             }
             // Of drivers alone it follows from the amount of wire.
-            LimitName::ArrayPower => self.problem.regime == Regime::Supply,
+            LimitName::ArrayPower => {
+                self.problem.regime == Regime::Supply || self.problem.task.reverses_farther()
+            }
             _ => false,
         };
         let over = |a: f64| self.worst(window(a), of_the_model);

@@ -36,9 +36,6 @@ pub struct Contradiction {
     pub message: String,
 }
 
-/// A resistance, ohm, that leaves every coil its driver's current.
-const UNLIMITED_OHM: f64 = 1e-9;
-
 /// Slack of a comparison of two limits.
 const TOUCHING: f64 = 1e-12;
 
@@ -59,16 +56,19 @@ impl Domain {
                 }
                 (LimitName::Voltage, _) => bound.limit / problem.task.current_max_a,
                 (LimitName::ArrayPower, Regime::Driver) => {
-                    // Drivers that set the strongest one's current set all others'.
-                    let [heat_w, _] = problem.task.array_heat_w(UNLIMITED_OHM);
-                    bound.limit / (heat_w / UNLIMITED_OHM)
+                    // Of one ohm, at the voltage that gives the strongest driver its current: the supply may allow
+                    // those that reverse farther no more.
+                    let task = problem.task;
+                    let voltage_v = task.voltage_v.map(|_| task.current_max_a);
+                    let [heat_w, _] = task.drivers.most_heat_w(voltage_v, 1.0);
+                    bound.limit / heat_w
                 }
                 (LimitName::Mass, _) => {
                     most = most.min(bound.limit / problem.strand.mass_per_volume());
                     continue;
                 }
                 (LimitName::ArrayMass, _) => {
-                    let mass_kg = bound.limit / problem.task.array_a.len() as f64;
+                    let mass_kg = bound.limit / problem.task.drivers.ends_a.len() as f64;
                     most = most.min(mass_kg / problem.strand.mass_per_volume());
                     continue;
                 }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::loop_settling::Loop;
 use super::model::{CoilModel, Sloped, Strand, Window};
 use super::sqp::{Local, Point, Smooth};
+use crate::array_heat::Drivers;
 use crate::circuit::SETTLING_TIME_CONSTANTS;
 pub use crate::limits::LimitName;
 use crate::limits::{CoilQuantity, LIMITS, bobbin_bore_m};
@@ -59,10 +60,8 @@ pub struct Task {
     pub voltage_v: Option<f64>,
     /// Bandwidth of the drivers' current loops, Hz; `None` where they set voltages.
     pub bandwidth_hz: Option<f64>,
-    /// Largest currents of all coils of the array, A, the largest first.
-    pub array_a: Vec<f64>,
-    /// Limit of the sum of their currents, A.
-    pub total_current_max_a: Option<f64>,
+    /// The currents that all coils of the array may have.
+    pub drivers: Drivers,
     /// The wires to choose among.
     pub strands: Vec<Strand>,
 }
@@ -80,29 +79,20 @@ impl Task {
         }
     }
 
-    /// Heat of all coils, W, of one `resistance_ohm`, and its derivative by that: as many coils at their largest
-    /// current as the sum allows, as `evaluate` states it.
+    /// Heat of all coils, W, of `resistance_ohm` each, as `evaluate` states it, and its derivative by that.
     #[must_use]
-    pub(crate) fn array_heat_w(&self, resistance_ohm: f64) -> [f64; 2] {
-        let supplied_a = self.voltage_v.map_or(f64::INFINITY, |v| v / resistance_ohm);
-        let mut left = [self.total_current_max_a.unwrap_or(f64::INFINITY), 0.0];
-        let (mut heat_w, mut slope_w) = (0.0, 0.0);
-        for &most_a in &self.array_a {
-            let rated = if most_a <= supplied_a {
-                [most_a, 0.0]
-            } else {
-                [supplied_a, -supplied_a / resistance_ohm]
-            };
-            let current = if rated[0] <= left[0] { rated } else { left };
-            left = [left[0] - current[0], left[1] - current[1]];
-            let [a, by_ohm] = current;
-            heat_w += resistance_ohm * a * a;
-            slope_w += a * a + 2.0 * resistance_ohm * a * by_ohm;
-        }
-        [heat_w, slope_w]
+    pub fn array_heat_w(&self, resistance_ohm: f64) -> [f64; 2] {
+        self.drivers.most_heat_w(self.voltage_v, resistance_ohm)
     }
 
-    /// The same with the derivatives of the resistance.
+    /// Whether a driver reverses farther than the rated current: the supply may limit it where it limits no other.
+    #[must_use]
+    pub(crate) fn reverses_farther(&self) -> bool {
+        let mut ends = self.drivers.ends_a.iter();
+        ends.any(|[least_a, _]| -least_a > self.current_max_a)
+    }
+
+    /// The same heat with the derivatives of the resistance.
     fn array_power_w(&self, resistance: Sloped) -> Sloped {
         let [value, by_ohm] = self.array_heat_w(resistance.value);
         let slope = resistance.slope.map(|slope| slope * by_ohm);
@@ -347,7 +337,7 @@ impl<'a> Problem<'a> {
             CoilQuantity::WindingFill => along(1.0, [0.0; 3]),
             CoilQuantity::Power => current.product(current).product(resistance),
             CoilQuantity::Mass => mass(),
-            CoilQuantity::ArrayMass => mass().times(self.task.array_a.len() as f64),
+            CoilQuantity::ArrayMass => mass().times(self.task.drivers.ends_a.len() as f64),
             CoilQuantity::ArrayPower => self.task.array_power_w(resistance),
             CoilQuantity::WireLength => volume.times(self.strand.length_per_volume()),
             CoilQuantity::CoreField => response.core_field_t.along(current),
@@ -474,29 +464,5 @@ impl Smooth for Problem<'_> {
 
     fn is_equality(&self, row: usize) -> bool {
         self.bounds[row].name.is_equality()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::optimum::tests::{seed_limits, task};
-
-    #[test]
-    fn the_heat_of_all_coils_has_the_slope_of_small_steps() {
-        let task = Task {
-            array_a: vec![3.0, 2.0, 2.0, 1.3],
-            total_current_max_a: Some(6.0),
-            ..task(seed_limits(), Some(12.0))
-        };
-        // The drivers', the sum's and the supply's currents in turn.
-        for (ohm, heat_w) in [(0.7, 9.8), (5.0, 61.6), (7.0, 468.0 / 7.0), (20.0, 28.8)] {
-            let [value, slope] = task.array_heat_w(ohm);
-            assert!((value / heat_w - 1.0).abs() < 1e-12, "{ohm}: {value}");
-            let small = 1e-5 * ohm;
-            let [more, less] = [ohm + small, ohm - small].map(|ohm| task.array_heat_w(ohm)[0]);
-            let by = (more - less) / (2.0 * small);
-            assert!((slope - by).abs() < 1e-7 * value, "{ohm}: {slope} {by}");
-        }
     }
 }

@@ -5,6 +5,7 @@ use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::model::{CoilModel, Strand, Window};
 use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
+use crate::array_heat::Drivers;
 use fluxform_design::{Coil, Core, Design, Driver, Steel};
 use fluxform_field::magnet::MagnetRule;
 
@@ -50,9 +51,6 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
         return Err(NoTask::NoVoltage);
     }
     let supply = &design.supply;
-    let ends = currents.iter().zip(&supply.current_min_a);
-    let mut array_a: Vec<f64> = ends.map(|(up, down)| up.max(-down)).collect();
-    array_a.sort_by(|a, b| b.total_cmp(a));
     Ok(Task {
         limits: design.limits,
         fixed,
@@ -64,8 +62,7 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
             Driver::Voltage => None,
             Driver::Current => Some(supply.bandwidth_hz),
         },
-        array_a,
-        total_current_max_a: supply.total_current_max_a,
+        drivers: Drivers::of(supply),
         strands: Strand::choices(&design.wire),
     })
 }

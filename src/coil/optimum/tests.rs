@@ -4,6 +4,7 @@ use super::air::AirCoil;
 use super::problem::{Problem, Regime};
 use super::sqp::Smooth;
 use super::*;
+use crate::array_heat::Drivers;
 use crate::circuit::Circuit;
 use fluxform_base::progress::Silent;
 use fluxform_design::{Limits, Wire};
@@ -46,8 +47,10 @@ pub(super) fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
         current_max_a: 2.0,
         voltage_v,
         bandwidth_hz: None,
-        array_a: vec![2.0],
-        total_current_max_a: None,
+        drivers: Drivers {
+            ends_a: vec![[0.0, 2.0]],
+            total_max_a: None,
+        },
         strands: Strand::choices(&wire(0.0007)),
     }
 }

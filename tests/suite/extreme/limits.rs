@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::check::{Outcome, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
+use fluxform::coil::array_heat::Drivers;
 use fluxform::coil::optimum::air::AirCoil;
 use fluxform::coil::optimum::{
     BestCoil, CertificateKind, Fixed, LimitName, OptimumStatus, Outcome as Optimum, Settings,
@@ -50,8 +51,10 @@ fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> 
         current_max_a: 2.0,
         voltage_v: None,
         bandwidth_hz: None,
-        array_a: vec![2.0],
-        total_current_max_a: None,
+        drivers: Drivers {
+            ends_a: vec![[0.0, 2.0]],
+            total_max_a: None,
+        },
         strands: Strand::choices(&wire),
     };
     let settings = Settings {

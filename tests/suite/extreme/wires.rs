@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::check::{Outcome, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
+use fluxform::coil::array_heat::Drivers;
 use fluxform::coil::circuit::{Circuit, turns_that_fit};
 use fluxform::coil::optimum::air::AirCoil;
 use fluxform::coil::optimum::{Fixed, Settings, Strand, Task, optimise_wound};
@@ -301,8 +302,10 @@ fn whole(d: f64) -> Outcome {
         current_max_a: 2.0,
         voltage_v: None,
         bandwidth_hz: None,
-        array_a: vec![2.0],
-        total_current_max_a: None,
+        drivers: Drivers {
+            ends_a: vec![[0.0, 2.0]],
+            total_max_a: None,
+        },
         strands: Strand::choices(&wire(d)),
     };
     let outcome = optimise_wound(&model, &task, &Settings::default(), &Silent).map_err(reported)?;
