@@ -9,6 +9,40 @@ fn number(value: &Value, path: &str) -> f64 {
     found.as_f64().unwrap_or_else(|| panic!("{path}: {found}"))
 }
 
+/// Heat that needs more wire lengthened or widened the coil past a round limit on its size, with exit code 4.
+#[test]
+fn more_wire_for_less_heat_keeps_the_limits_on_sizes() {
+    let place = Place::new();
+    let strict = |args: &[&str]| {
+        let search = ["--starts", "2", "--certificate-cells", "0", "-q"];
+        let out = ["--out", "best.toml", "--force"];
+        let args = [&["optimize", "design.toml"], args, &search, &out].concat();
+        place.run(&args).ends(0);
+        place
+            .run(&["evaluate", "best.toml", "--strict", "-q"])
+            .ends(0);
+    };
+    let design = |height_mm: f64, outer_mm: f64, length_mm: f64, power_w: f64| {
+        let text = format!(
+            "name = \"round\"\n[coil]\ninner_diameter_mm = 20\nouter_diameter_mm = 30\nlength_mm = 10\n\
+             [wire]\ndiameter_mm = 0.1\n[supply]\ncurrent_max_a = 8\nvoltage_v = 48\n\
+             [target]\nheight_mm = {height_mm:?}\n[limits]\nouter_diameter_max_mm = {outer_mm:?}\n\
+             length_max_mm = {length_mm:?}\npower_max_w = {power_w:?}\n"
+        );
+        place.write("design.toml", &text);
+    };
+    for length_mm in [3.0, 5.0, 8.0, 10.0, 12.0, 15.0] {
+        for power_w in [0.5, 1.0, 2.0] {
+            design(5.5, 110.0, length_mm, power_w);
+            strict(&[]);
+        }
+    }
+    for outer_mm in [38.0, 40.0, 42.0, 44.0] {
+        design(30.0, outer_mm, 100.0, 1.0);
+        strict(&["--fix", "length_mm"]);
+    }
+}
+
 /// The sum of currents that reverse was taken of their magnitudes: 24.3 W of 218.6 W was stated, and met.
 #[test]
 fn reversing_drivers_heat_all_coils_whatever_the_sum_allows() {

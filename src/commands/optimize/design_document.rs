@@ -1,7 +1,7 @@
 //! The optimum as a design document, and what `evaluate` says of it.
 //!
 //! Dimensions are rounded to 15 digits of millimetres; where that breaks a limit by a rounding
-//! the coil gives way by as much, so that the document meets its own limits.
+//! the coil gives way by as much where there is room, so that the document meets its own limits.
 
 use std::path::Path;
 
@@ -66,12 +66,15 @@ fn at_least_mm(limit_m: f64) -> f64 {
     value
 }
 
-/// Inner and outer diameter and length, mm.
+/// Inner and outer diameter and length, mm, and the limits that they keep.
 #[derive(Debug, Clone, Copy)]
 struct Sizes {
     inner: f64,
     outer: f64,
     length: f64,
+    inner_min: f64,
+    outer_max: f64,
+    length_max: f64,
 }
 
 impl Sizes {
@@ -83,36 +86,36 @@ impl Sizes {
         let length_max = most(task.limits.length_max_m);
         let within = |outer: f64| outer.min(outer_max);
         let outer = within(mm(2.0 * window.outer_radius_m()));
-        let floor = least.max(BORE_MIN * outer);
-        let mut inner = mm(2.0 * window.inner_radius_m).max(floor);
+        let inner_min = least.max(BORE_MIN * outer);
         let sizes = Self {
-            inner,
+            inner: mm(2.0 * window.inner_radius_m).max(inner_min),
             outer,
             length: mm(window.length_m).min(length_max),
+            inner_min,
+            outer_max,
+            length_max,
         };
         let Some(whole) = best.whole else {
             return sizes;
         };
         let wire = mm(best.strand.diameter_m);
         let build = 2.0 * whole.layers as f64 * wire;
-        if inner + build > outer_max {
-            inner = (outer_max - build).max(floor);
+        let mut inner = sizes.inner;
+        if task.fixed.outer_diameter_m.is_some() || inner + build > outer_max {
+            inner = rounded(outer - build).max(inner_min);
         }
         Self {
             inner,
             outer: within(rounded(inner + build)),
             length: rounded(whole.turns_per_layer as f64 * wire).min(length_max),
+            ..sizes
         }
     }
 
     /// Less wire by the relative amount `by`.
     fn shrink(&mut self, by: f64, best: &BestCoil, fixed: &Fixed) {
         if best.whole.is_some() {
-            let step = by * self.outer;
-            if fixed.inner_diameter_m.is_none() && self.inner > step {
-                self.inner -= step;
-                self.outer -= step;
-            }
+            self.move_bore(-by * self.outer, fixed);
         } else if fixed.length_m.is_none() {
             self.length *= 1.0 - by;
         } else if fixed.outer_diameter_m.is_none() {
@@ -120,6 +123,31 @@ impl Sizes {
         } else if fixed.inner_diameter_m.is_none() {
             self.inner += by * (self.outer - self.inner);
         }
+    }
+
+    /// More wire by the relative amount `by`, or as much as fits in the first dimension with room.
+    fn grow(&mut self, by: f64, best: &BestCoil, fixed: &Fixed) {
+        let step = by * (self.outer - self.inner);
+        if best.whole.is_some() {
+            self.move_bore(by * self.outer, fixed);
+        } else if fixed.length_m.is_none() && self.length < self.length_max {
+            self.length = (self.length * (1.0 + by)).min(self.length_max);
+        } else if fixed.outer_diameter_m.is_none() && self.outer < self.outer_max {
+            self.outer = (self.outer + step).min(self.outer_max);
+        } else if fixed.inner_diameter_m.is_none() && self.inner > self.inner_min {
+            self.inner = (self.inner - step).max(self.inner_min);
+        }
+    }
+
+    /// A bore wider by `step` around whole layers, as far as the limits allow.
+    fn move_bore(&mut self, step: f64, fixed: &Fixed) {
+        if fixed.inner_diameter_m.is_some() || fixed.outer_diameter_m.is_some() {
+            return;
+        }
+        let narrower = (self.inner_min - self.inner).min(0.0);
+        let step = step.clamp(narrower, (self.outer_max - self.outer).max(0.0));
+        self.inner += step;
+        self.outer = (self.outer + step).min(self.outer_max);
     }
 }
 
@@ -142,7 +170,7 @@ pub(super) fn write(
     loop {
         let written = text_of(document, best, &sizes)?;
         let mut rated = rated(&written.design, tolerance)?;
-        let over = excess(&rated, best.regime);
+        let over = excess(&rated, best.regime, task);
         if over == 0.0 || over.abs() > ROUNDING || attempt == ATTEMPTS {
             if document.design.limits.array_settling_max_s.is_some() {
                 of_rated(
@@ -154,14 +182,18 @@ pub(super) fn write(
         }
         // The limits' own slopes are of order one.
         let by = (over.abs() * 2f64.powi(attempt)).max(2.3e-16);
-        sizes.shrink(by.copysign(over), best, &task.fixed);
+        if over > 0.0 {
+            sizes.shrink(by, best, &task.fixed);
+        } else {
+            sizes.grow(by, best, &task.fixed);
+        }
         attempt += 1;
     }
 }
 
 /// By how much limits on the amount of wire are exceeded, relatively; negative where the coil has
 /// too little of it.
-fn excess(rated: &Rated, regime: Regime) -> f64 {
+fn excess(rated: &Rated, regime: Regime, task: &Task) -> f64 {
     let mut most = 0.0;
     for (key, LimitCheck { value, limit, met }) in &rated.limits {
         let of_wire = by_key(key).filter(|row| !row.name.is_dimension());
@@ -170,8 +202,11 @@ fn excess(rated: &Rated, regime: Regime) -> f64 {
         };
         let over = value / limit - 1.0;
         // At a given voltage heat falls with the resistance.
-        let heat = matches!(row.name, LimitName::Power | LimitName::ArrayPower);
-        let lacking = heat && regime == Regime::Supply;
+        let lacking = match row.name {
+            LimitName::Power => regime == Regime::Supply,
+            LimitName::ArrayPower => task.array_heat_w(rated.coil.circuit.resistance_ohm)[1] < 0.0,
+            _ => false,
+        };
         let over = if lacking { -over } else { over };
         if f64::abs(over) > f64::abs(most) {
             most = over;
