@@ -1,12 +1,10 @@
 //! Coils that can be wound: what is reported of them, and which are worth a look.
 
-use super::diagnosis;
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
 use super::model::Window;
 use super::outcome::{
-    Advantage, Alternative, BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, Violation,
-    WholeTurns,
+    Advantage, Alternative, BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, WholeTurns,
 };
 use super::problem::{LimitName, Problem};
 use super::search;
@@ -73,32 +71,6 @@ pub(super) fn around_optimum(solved: &Solved<'_>) -> Option<Domain> {
     domain.outer_m[1] = domain.outer_m[1].min(WIDER * window.outer_radius_m());
     domain.length_m[1] = domain.length_m[1].min(WIDER * window.length_m);
     Some(domain)
-}
-
-/// Why no coil can be wound though coils of any turns exist: what the nearest whole one breaks.
-pub(super) fn rounded_status(open: &[&Solved<'_>]) -> OptimumStatus {
-    let mut least: Option<(Vec<Violation>, Window)> = None;
-    for solved in open {
-        let Some(local) = &solved.best else { continue };
-        let wire_m = solved.problem.strand.diameter_m;
-        let mut window = Problem::window(local.x);
-        let whole = |length_m: f64| (length_m / wire_m).floor().max(1.0) * wire_m;
-        window.depth_m = whole(window.depth_m);
-        window.length_m = whole(window.length_m);
-        let broken = diagnosis::violations(&solved.problem, window);
-        if least.is_none() {
-            least = Some((broken, window));
-        }
-    }
-    let (violations, least) = least.unwrap_or((
-        Vec::new(),
-        Window {
-            inner_radius_m: 0.0,
-            depth_m: 0.0,
-            length_m: 0.0,
-        },
-    ));
-    OptimumStatus::Infeasible { violations, least }
 }
 
 /// The coil of a leaf in SI units.

@@ -114,6 +114,23 @@ pub(super) fn why_none(
     })
 }
 
+/// The sum of the squared violations of a window's limits; infinite where its geometry or a given size is
+/// impossible, or the model fails.
+pub(super) fn miss(problem: &Problem<'_>, window: Window) -> f64 {
+    let Some(point) = Violated(problem).at(Problem::coordinates(&window)) else {
+        return f64::INFINITY;
+    };
+    let held = point.rows.iter().zip(&problem.bounds).all(|(&row, bound)| {
+        let over = if bound.name.is_equality() {
+            row.abs()
+        } else {
+            row
+        };
+        over <= 1e3 * FEASIBLE
+    });
+    if held { point.objective } else { f64::INFINITY }
+}
+
 /// Limits that a window breaks, worst first.
 pub(super) fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation> {
     let Some(rated) = problem.rate(window) else {

@@ -47,6 +47,7 @@ mod local_searches;
 mod loop_settling;
 pub mod model;
 pub mod near_optimal_bore;
+mod nearest_whole;
 pub mod neighbours;
 pub mod outcome;
 pub mod problem;

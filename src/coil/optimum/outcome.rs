@@ -14,11 +14,12 @@ pub use fluxform_base::accuracy::CertificateKind;
 pub enum OptimumStatus {
     /// The best coil within the limits.
     Optimal,
-    /// No coil meets the limits: those that the least violating coil breaks, worst first.
+    /// No coil meets the limits.
     Infeasible {
-        /// Limits that it breaks.
+        /// Limits that `least` breaks, worst first.
         violations: Vec<Violation>,
-        /// That coil.
+        /// The coil that breaks the limits least; where coils of any turns meet them, of the whole ones next to
+        /// the best of those.
         least: Window,
     },
     /// Two limits exclude each other.
@@ -56,7 +57,7 @@ impl OptimumStatus {
     }
 }
 
-/// A limit that the least violating coil breaks.
+/// A limit that a coil breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Violation {
     /// Which.

@@ -13,10 +13,11 @@ use rayon::prelude::*;
 
 use super::best_bore::{Bores, summit};
 use super::best_first::{CoilSets, Parts, Strongest, least, whole};
-use super::candidates::{self, Leaf, around_optimum, rounded_status};
+use super::candidates::{self, Leaf, around_optimum};
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
 use super::model::{CoilModel, Window};
+use super::nearest_whole;
 use super::outcome::{BestCoil, Certificate, CertificateKind, Outcome};
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::sqp::{self, FEASIBLE};
@@ -90,7 +91,7 @@ pub(super) fn optimise(
     Ok(
         candidates::found(search.listed, sharp, certificate).unwrap_or_else(|| {
             let open: Vec<&Solved<'_>> = open().collect();
-            candidates::none(rounded_status(&open), sharp)
+            candidates::none(nearest_whole::status(&open), sharp)
         }),
     )
 }

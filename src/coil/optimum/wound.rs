@@ -6,9 +6,10 @@
 use super::best_first::Strongest;
 use super::bounded_coils::{BoundedCoils, next_to_continuous};
 use super::branch_and_bound::{self, GAP};
-use super::candidates::{self, SHARE, around_optimum, rounded_status};
+use super::candidates::{self, SHARE, around_optimum};
 use super::local_searches::{self, Settings, Solved};
 use super::model::CoilModel;
+use super::nearest_whole;
 use super::outcome::{BestCoil, Certificate, CertificateKind, OptimumStatus, Outcome};
 use super::problem::Task;
 use super::screened_coils;
@@ -81,7 +82,7 @@ pub fn optimise_wound(
         }
     };
     Ok(candidates::found(search.listed, &problems, certificate)
-        .unwrap_or_else(|| candidates::none(rounded_status(&open), &problems)))
+        .unwrap_or_else(|| candidates::none(nearest_whole::status(&open), &problems)))
 }
 
 #[cfg(test)]

@@ -138,7 +138,7 @@ pub fn optimize(
         design: design.name.clone(),
         inputs,
         status: outcome.status.ending(),
-        no_coil: no_coil::why(&outcome.status, request.wound),
+        no_coil: no_coil::why(&outcome, request.wound),
         wound: request.wound,
         fixed: sensitivities(
             &fixed,

@@ -3,12 +3,12 @@
 use super::NoCoil;
 use crate::coil::circuit::CoilSize;
 use crate::coil::limits::LIMITS;
-use crate::coil::optimum::OptimumStatus;
 use crate::coil::optimum::outcome::Violation;
+use crate::coil::optimum::{OptimumStatus, Outcome};
 
 /// Why there is no coil; `None` where there is one.
-pub(super) fn why(status: &OptimumStatus, wound: bool) -> Option<NoCoil> {
-    match status {
+pub(super) fn why(outcome: &Outcome, wound: bool) -> Option<NoCoil> {
+    match &outcome.status {
         OptimumStatus::Optimal => None,
         OptimumStatus::Contradictory(contradiction) => Some(NoCoil {
             message: format!("no coil meets the limits: {}", contradiction.message),
@@ -17,7 +17,7 @@ pub(super) fn why(status: &OptimumStatus, wound: bool) -> Option<NoCoil> {
             missing: Vec::new(),
         }),
         OptimumStatus::Infeasible { violations, least } => Some(NoCoil {
-            message: infeasible(violations, wound),
+            message: infeasible(violations, wound, outcome.continuous.is_some()),
             violations: violations.clone(),
             least: Some(CoilSize::from(least)).filter(|size| size.length_m > 0.0),
             missing: Vec::new(),
@@ -43,11 +43,19 @@ pub(super) fn why(status: &OptimumStatus, wound: bool) -> Option<NoCoil> {
     }
 }
 
-fn infeasible(violations: &[Violation], wound: bool) -> String {
+/// Where coils of any turns meet the limits, those of whole turns were compared next to the best one alone.
+fn infeasible(violations: &[Violation], wound: bool, any_turns_do: bool) -> String {
     let kind = if wound {
         "coil that can be wound"
     } else {
         "coil"
+    };
+    let least = if any_turns_do {
+        "of the whole coils next to the best one of any turns, the one that misses least has"
+    } else if wound {
+        "even the coil of any turns that misses least has"
+    } else {
+        "even the coil that misses least has"
     };
     let Some(worst) = violations.first() else {
         return format!("no {kind} meets the limits");
@@ -62,8 +70,7 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
         n => format!(", and {n} more limits are missed"),
     };
     format!(
-        "no {kind} meets the limits: nearest to blame is {}; even the coil that misses least has \
-         {value} {unit} where {limit} {unit} are allowed, {:.1} % off{more}",
+        "no {kind} meets the limits: nearest to blame is {}; {least} {value} {unit} where {limit} {unit} are allowed, {:.1} % off{more}",
         blamed.design_key,
         worst.excess.abs() * 100.0
     )

@@ -94,9 +94,10 @@ pub struct Optimization {
 pub struct NoCoil {
     /// In words, with what to do.
     pub message: String,
-    /// The limits that the least violating coil breaks, worst first.
+    /// The limits that `least` breaks, worst first.
     pub violations: Vec<Violation>,
-    /// That coil.
+    /// The coil that breaks the limits least: of all, or of whole ones next to the best one of any turns, where that
+    /// one meets the limits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least: Option<CoilSize>,
     /// Limits of which one is missing.

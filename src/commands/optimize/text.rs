@@ -51,10 +51,14 @@ fn none(sheet: &mut Sheet, result: &Optimization) {
     if let Some(none) = &result.no_coil
         && let Some(least) = &none.least
     {
+        let of = match result.continuous_force_n {
+            Some(_) => " of the whole coils next to the best one of any turns",
+            None => "",
+        };
         sheet.line(
             "nearest",
             &format!(
-                "{} to {} diameter, {} long breaks the limits least",
+                "{} to {} diameter, {} long breaks the limits least{of}",
                 mm(least.inner_diameter_m),
                 mm(least.outer_diameter_m),
                 mm(least.length_m)
