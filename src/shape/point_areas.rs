@@ -7,14 +7,19 @@
 //! area of a smooth silhouette converges with the second power of the spacing, as the rule does.
 //!
 //! Where the surface ends or breaks within a cell, its corners alone describe it badly, and no choice
-//! among the points shows how badly. Such cells are quartered, and their quarters, until the corners do.
+//! among the points shows how badly. Such cells are quartered, and their quarters, until the corners do; so are
+//! those that have surface at no corner, and those over which a part rises between the corners.
 
-use std::collections::{BTreeMap, HashMap};
+mod quarters;
+
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::quarters::{CellSamples, Part, cell_samples};
+use crate::deviation::Lattice;
 use crate::height::Grid;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
@@ -32,13 +37,8 @@ const LEAST_LOOKS: usize = 9;
 const MOST_CELLS: usize = 4096;
 /// A cell of the grid is smooth whose middle departs by less than this share of its height from its corners' mean.
 const SMOOTH: f64 = 4e-3;
-/// The same of its parts, times their share of the cell: what a part adds to lambda's error is its departure times
-/// its area.
-const SMOOTH_PART: f64 = 5e-4;
 /// Bisections of a side: to 2e-5 of it.
 const BISECTIONS: u32 = 16;
-/// The same of a part of a cell: to 4e-3 of it.
-const PART_BISECTIONS: u32 = 8;
 /// The least that a point stands for, of a cell: no point counts for nothing.
 pub(super) const LEAST: f64 = 1e-6;
 /// Sides between two looks at the progress.
@@ -56,6 +56,31 @@ pub struct Over<'a> {
     pub covers: &'a (dyn Fn([f64; 2]) -> bool + Sync),
     /// How many triangles a look at it compares the place with.
     pub near: &'a (dyn Fn([f64; 2]) -> usize + Sync),
+    /// A mesh's faces over each cell; `None`: only the cells' corners and middles are known.
+    pub lattice: Option<&'a Lattice<'a>>,
+}
+
+impl Over<'_> {
+    /// Whether a cell without surface at its corners has some all the same.
+    fn misses(&self, cell: usize) -> bool {
+        (self.lattice).is_some_and(|lattice| lattice.standing(cell).is_some())
+    }
+
+    /// By how much the surface rises above what lies between the corners of a cell, m.
+    fn rise_m(&self, cell: usize) -> f64 {
+        self.lattice.map_or(0.0, |lattice| lattice.rise_m(cell))
+    }
+
+    /// All that covers a missed cell as one sample, for want of effort; none of other cells.
+    fn missed_whole(&self, cell: usize) -> CellSamples {
+        let whole = self.lattice.and_then(|lattice| {
+            let standing = lattice.standing(cell)?;
+            let height_m = (self.height_m)(standing.at_m)?;
+            let part = Part::of(standing, height_m);
+            Some((part, [part.area_m2; 2]))
+        });
+        whole.into_iter().collect()
+    }
 }
 
 /// Cells of a grid whose corners describe the surface badly, sampled on finer places; columns of equal
@@ -94,12 +119,22 @@ pub fn areas_m2(
     progress: &dyn Progress,
 ) -> Result<(Vec<f64>, FineCells), Interrupted> {
     let mut areas = vec![0.0; heights_m.len()];
-    let broken = broken_cells(grid, heights_m, surface, progress)?;
+    let (broken, beyond) = broken_cells(grid, heights_m, surface, progress)?;
     let mut fine = FineCells::default();
     if !broken.is_empty() {
         fine.smooth = vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)];
         fine.point_area_m2 = vec![0.0; heights_m.len()];
-        for (cell, samples) in sampled(grid, &broken, surface, progress)? {
+        let mut all = sampled(grid, &broken, surface, progress)?;
+        // Surface that no point stands for is never left out.
+        let left = if all.is_empty() { broken } else { beyond };
+        let is_missed = |cell: &usize| {
+            corners_of(grid, *cell)
+                .iter()
+                .all(|k| heights_m[*k].is_none())
+        };
+        let left = left.into_iter().filter(is_missed);
+        all.extend(left.map(|cell| (cell, surface.missed_whole(cell))));
+        for (cell, samples) in all {
             fine.smooth[cell] = samples.is_empty();
             for (part, [area_m2, coarse_area_m2]) in samples {
                 fine.x_m.push(part.at_m[0]);
@@ -122,9 +157,6 @@ pub fn areas_m2(
     shares.keep_all(&mut areas);
     Ok((areas, fine))
 }
-
-/// Samples of a cell: the part that each stands for, and its areas in both rules, m^2.
-type CellSamples = Vec<(Part, [f64; 2])>;
 
 /// The samples of every broken cell, as finely divided as their number allows.
 fn sampled(
@@ -171,216 +203,6 @@ fn sampled(
         }
     }
     Ok(Vec::new())
-}
-
-/// Samples a cell in the middle of quarters, which are quartered again where the surface ends or departs
-/// from their corners; none where none has surface. Also how many triangles its looks met.
-fn cell_samples(grid: &Grid, cell: usize, depth: u32, surface: Over) -> (CellSamples, usize) {
-    let across = grid.x_m.samples - 1;
-    let part = |axis: Axis, node: usize| Axis {
-        from: axis.node(node),
-        to: axis.node(node + 1),
-        samples: (1 << depth) + 1,
-    };
-    let mut quarters = Quarters {
-        whole: depth,
-        x_m: part(grid.x_m, cell % across),
-        y_m: part(grid.y_m, cell / across),
-        surface,
-        met: 0,
-        heights_m: BTreeMap::new(),
-        ends: BTreeMap::new(),
-        fine: Vec::new(),
-        coarse: Vec::new(),
-    };
-    quarters.divide(depth, [0, 0]);
-    let Quarters {
-        fine, coarse, met, ..
-    } = quarters;
-    let area = |rule: &[Part]| rule.iter().map(|part| part.area_m2).sum::<f64>();
-    let total = area(&fine);
-    if total == 0.0 {
-        return (Vec::new(), met);
-    }
-    let coarse = if coarse.is_empty() {
-        fine.clone()
-    } else {
-        coarse
-    };
-    let scale = total / area(&coarse);
-    // A part that both rules share is one sample.
-    let of_coarse = |part: &Part| match coarse.contains(part) {
-        true => scale * part.area_m2,
-        false => 0.0,
-    };
-    let rules = fine
-        .iter()
-        .map(|part| (*part, [part.area_m2, of_coarse(part)]));
-    let coarse_alone = coarse.iter().filter(|part| !fine.contains(part));
-    let coarse_alone = coarse_alone.map(|part| (*part, [0.0, scale * part.area_m2]));
-    (rules.chain(coarse_alone).collect(), met)
-}
-
-/// A node of the finest division of a cell, along x and y.
-type Node = [usize; 2];
-
-/// A part of a cell, and the sample that stands for it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Part {
-    at_m: [f64; 2],
-    height_m: f64,
-    area_m2: f64,
-}
-
-/// Whether a part is not quartered, and its sample if it has surface.
-#[derive(Debug, Clone, Copy)]
-enum Leaf {
-    Is(Option<Part>),
-    IsNot,
-}
-
-/// A cell that is quartered where its corners describe the surface badly.
-struct Quarters<'a> {
-    /// How often it is quartered at most.
-    whole: u32,
-    /// The nodes of the finest division.
-    x_m: Axis,
-    y_m: Axis,
-    surface: Over<'a>,
-    /// Triangles that its looks met.
-    met: usize,
-    heights_m: BTreeMap<Node, Option<f64>>,
-    /// How far the surface goes from a node to the next of a part: two parts have that side.
-    ends: BTreeMap<[Node; 2], f64>,
-    /// Parts that are not quartered again.
-    fine: Vec<Part>,
-    /// The same without the last quartering of each.
-    coarse: Vec<Part>,
-}
-
-impl Quarters<'_> {
-    fn place(&self, node: Node) -> [f64; 2] {
-        [self.x_m.node(node[0]), self.y_m.node(node[1])]
-    }
-
-    fn height_m(&mut self, node: Node) -> Option<f64> {
-        if let Some(known) = self.heights_m.get(&node) {
-            return *known;
-        }
-        let height_m = self.look(self.place(node));
-        self.heights_m.insert(node, height_m);
-        height_m
-    }
-
-    fn look(&mut self, place: [f64; 2]) -> Option<f64> {
-        self.met += (self.surface.near)(place);
-        (self.surface.height_m)(place)
-    }
-
-    /// Divides the part from the node `first` on, which is quartered `depth` times at most. Returns what stands
-    /// for it where it is not quartered.
-    fn divide(&mut self, depth: u32, first: Node) -> Leaf {
-        fluxform_base::progress::poll();
-        let side = 1 << depth;
-        let corners = AROUND.map(|by| [first[0] + side * by[0], first[1] + side * by[1]]);
-        let heights_m = corners.map(|corner| self.height_m(corner));
-        let smooth = match heights_m.iter().flatten().count() {
-            _ if depth == 0 => true,
-            0 => true,
-            4 => {
-                let mean = 0.25 * heights_m.iter().flatten().sum::<f64>();
-                let middle = self.height_m(first.map(|at| at + side / 2));
-                let parts = f64::from(1_u32 << (2 * (self.whole - depth)));
-                middle.is_some_and(|height| ((height - mean) / mean).abs() <= SMOOTH_PART * parts)
-            }
-            _ => false,
-        };
-        // The whole cell is divided: that is why it is here.
-        if smooth && depth < self.whole {
-            let part = self.part(corners, heights_m);
-            self.fine.extend(part);
-            return Leaf::Is(part);
-        }
-        let half = side / 2;
-        let quarters = AROUND.map(|by| {
-            self.divide(
-                depth - 1,
-                [first[0] + half * by[0], first[1] + half * by[1]],
-            )
-        });
-        if quarters
-            .iter()
-            .all(|quarter| matches!(quarter, Leaf::Is(_)))
-        {
-            let part = self.part(corners, heights_m);
-            self.coarse.extend(part);
-        } else {
-            let leaves = quarters.into_iter().filter_map(|quarter| match quarter {
-                Leaf::Is(part) => part,
-                Leaf::IsNot => None,
-            });
-            self.coarse.extend(leaves);
-        }
-        Leaf::IsNot
-    }
-
-    /// The piece of a part that has surface, with its middle; `None` without any.
-    fn part(&mut self, nodes: [Node; 4], heights_m: [Option<f64>; 4]) -> Option<Part> {
-        let corners = nodes.map(|node| self.place(node));
-        let mut outline = Vec::with_capacity(8);
-        for k in 0..4 {
-            let next = (k + 1) % 4;
-            let present = [heights_m[k].is_some(), heights_m[next].is_some()];
-            if present[0] {
-                outline.push(corners[k]);
-            }
-            if present[0] != present[1] {
-                let [has, lacks] = if present[0] { [k, next] } else { [next, k] };
-                let (from, to) = (corners[has], corners[lacks]);
-                let Over { covers, near, .. } = self.surface;
-                let end = self.ends.entry([nodes[has], nodes[lacks]]);
-                let part = end.or_insert_with(|| {
-                    self.met += PART_BISECTIONS as usize * near(from);
-                    covered_part(from, to, covers, PART_BISECTIONS)
-                });
-                outline.push(along(from, to, *part));
-            }
-        }
-        let (area_m2, middle) = area_and_middle(&outline)?;
-        let at_corner = || {
-            let mut present = corners.into_iter().zip(heights_m);
-            present.find_map(|(corner, height_m)| Some((corner, height_m?)))
-        };
-        // A bay of the silhouette may hold the middle.
-        let found = self.look(middle).map(|height_m| (middle, height_m));
-        let (at_m, height_m) = found.or_else(at_corner)?;
-        Some(Part {
-            at_m,
-            height_m,
-            area_m2,
-        })
-    }
-}
-
-/// The corners of a cell, one after the other around it.
-const AROUND: [Node; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
-
-/// Area and centre of mass of an outline; `None` without area.
-fn area_and_middle(outline: &[[f64; 2]]) -> Option<(f64, [f64; 2])> {
-    let first = outline.first()?;
-    let (mut twice, mut moment) = (0.0, [0.0; 2]);
-    for pair in outline.windows(2) {
-        let [a, b] = [pair[0], pair[1]].map(|p| [p[0] - first[0], p[1] - first[1]]);
-        let cross = a[0] * b[1] - a[1] * b[0];
-        twice += cross;
-        for k in 0..2 {
-            moment[k] += cross * (a[k] + b[k]) / 3.0;
-        }
-    }
-    (twice > 0.0).then(|| {
-        let middle = [0, 1].map(|k| first[k] + moment[k] / twice);
-        (0.5 * twice, middle)
-    })
 }
 
 fn along(from: [f64; 2], to: [f64; 2], part: f64) -> [f64; 2] {
@@ -500,27 +322,35 @@ impl<'a> Shares<'a> {
     }
 }
 
+/// The corners of a cell of a grid, x fastest.
+fn corners_of(grid: &Grid, cell: usize) -> [usize; 4] {
+    let columns = grid.x_m.samples;
+    let first = cell / (columns - 1) * columns + cell % (columns - 1);
+    [first, first + 1, first + columns, first + columns + 1]
+}
+
 /// The cells in which the surface ends or departs from its corners, ascending: of too many those that
-/// depart most.
+/// depart most, and the others.
 fn broken_cells(
     grid: &Grid,
     heights_m: &[Option<f64>],
     surface: Over,
     progress: &dyn Progress,
-) -> Result<Vec<usize>, Interrupted> {
+) -> Result<(Vec<usize>, Vec<usize>), Interrupted> {
     let [columns, rows] = [grid.x_m.samples, grid.y_m.samples];
     let across = columns.saturating_sub(1);
     let departs = |cell: usize| {
-        let first = cell / across * columns + cell % across;
-        let corners = [first, first + 1, first + columns, first + columns + 1];
-        let known = corners.map(|corner| heights_m[corner]);
+        let known = corners_of(grid, cell).map(|corner| heights_m[corner]);
         match known.iter().flatten().count() {
+            0 if surface.misses(cell) => f64::INFINITY,
             0 => 0.0,
             4 => {
                 let mean = 0.25 * known.iter().flatten().sum::<f64>();
                 let middle = [(grid.x_m, cell % across), (grid.y_m, cell / across)]
                     .map(|(axis, node)| 0.5 * (axis.node(node) + axis.node(node + 1)));
-                (surface.height_m)(middle).map_or(0.0, |height| ((height - mean) / mean).abs())
+                let off = |height: f64| ((height - mean) / mean).abs();
+                let between = surface.rise_m(cell) / mean;
+                (surface.height_m)(middle).map_or(0.0, off).max(between)
             }
             _ => f64::INFINITY,
         }
@@ -538,12 +368,14 @@ fn broken_cells(
         })
         .filter(|found| !found.as_ref().is_ok_and(|(_, by)| *by <= SMOOTH))
         .collect::<Result<_, Interrupted>>()?;
+    let mut beyond = Vec::new();
     if broken.len() > MOST_CELLS {
         broken.sort_by(|(a, by_a), (b, by_b)| by_b.total_cmp(by_a).then(a.cmp(b)));
-        broken.truncate(MOST_CELLS);
+        beyond = broken.split_off(MOST_CELLS);
         broken.sort_by_key(|(cell, _)| *cell);
     }
-    Ok(broken.into_iter().map(|(cell, _)| cell).collect())
+    let cells = |found: Vec<(usize, f64)>| found.into_iter().map(|(cell, _)| cell).collect();
+    Ok((cells(broken), cells(beyond)))
 }
 
 /// The covered part of a line that each end with surface gets.
@@ -647,6 +479,7 @@ mod tests {
             height_m: &height_at,
             covers: &|p| height_at(p).is_some(),
             near: &|_| 1,
+            lattice: None,
         };
         areas_m2(grid, &heights, surface, &Silent).unwrap()
     }
@@ -750,6 +583,7 @@ mod tests {
                 height_m: &disc,
                 covers: &|p| disc(p).is_some(),
                 near: &|_| near,
+                lattice: None,
             };
             areas_m2(&grid, &heights, surface, &Silent).unwrap()
         };

@@ -453,10 +453,15 @@ fn point_areas_m2(
         heights_m[place] = Some(height_m);
     }
     let height_at = |p: [f64; 2]| Some(probe.sample(p)?.height_m.max(0.0));
+    // Beyond, the lists of faces would take more memory than the points.
+    let lattice = (points.grid.len() <= MOST_CERTIFIED)
+        .then(|| probe.lattice(&points.grid, &heights_m))
+        .flatten();
     let surface = Over {
         height_m: &height_at,
         covers: &|p| probe.covers(p),
         near: &|p| probe.near(p),
+        lattice: lattice.as_ref(),
     };
     let (all, mut fine) = areas_m2(&points.grid, &heights_m, surface, progress)?;
     let of_points = |all: &[f64]| points.grid_index.iter().map(|&place| all[place]).collect();

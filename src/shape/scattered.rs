@@ -5,7 +5,7 @@ pub mod poisson;
 
 use std::sync::OnceLock;
 
-use crate::deviation::{Faces, Looks, Patch, Rect, primitive};
+use crate::deviation::{Faces, Lattice, Looks, Patch, Rect, Standing, primitive};
 use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample, reach_m};
@@ -18,6 +18,8 @@ use crate::surface::Surface;
 
 /// More points than this are refused.
 const MOST_POINTS: usize = 5_000_000;
+/// Places a side at which a formula is looked for in a rectangle whose corners it leaves bare.
+const LOOKED_FOR: usize = 8;
 
 /// Points with the area each stands for; columns of equal length, sorted by y, then x.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -209,6 +211,41 @@ impl<'a> Probe<'a> {
                 width * depth * covered_share(rect.corners(), &|p| self.covers(p))
             }
         }
+    }
+
+    /// The surface over a rectangle, with a place in it; `None` where there is none.
+    fn standing(&self, rect: &Rect, among: &[u32]) -> Option<Standing> {
+        if self.sorted().is_some() {
+            return self.sorted()?.standing(rect, among);
+        }
+        let corners = rect.corners().into_iter();
+        let mut places = corners.chain([rect.centre()]);
+        let found = places.rfind(|p| self.covers(*p));
+        let area_m2 = self.covered_m2(rect, among);
+        if let Some(at_m) = found.filter(|_| area_m2 > 0.0) {
+            return Some(Standing { at_m, area_m2 });
+        }
+        let (low_m, sides) = (rect.low_m, rect.sides());
+        let part = |k: usize| (k as f64 + 0.5) / LOOKED_FOR as f64;
+        let places = (0..LOOKED_FOR * LOOKED_FOR)
+            .map(|k| [part(k % LOOKED_FOR), part(k / LOOKED_FOR)])
+            .map(|[u, v]| [low_m[0] + u * sides[0], low_m[1] + v * sides[1]]);
+        let covered: Vec<_> = places.filter(|p| self.covers(*p)).collect();
+        let share = covered.len() as f64 / (LOOKED_FOR * LOOKED_FOR) as f64;
+        covered.get(covered.len() / 2).map(|at_m| Standing {
+            at_m: *at_m,
+            area_m2: share * sides[0] * sides[1],
+        })
+    }
+
+    /// A mesh's faces over each cell of `grid`, whose points have the heights `heights_m`; `None` for a formula.
+    pub(super) fn lattice<'b>(
+        &'b self,
+        grid: &Grid,
+        heights_m: &'b [Option<f64>],
+    ) -> Option<Lattice<'b>> {
+        let faces = self.sorted()?;
+        Some(Lattice::new(faces, grid, heights_m))
     }
 
     /// A bound of the vertical difference between surface and patch, m.

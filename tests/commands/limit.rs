@@ -139,6 +139,7 @@ fn sampled(object: &Object, array: &Array, samples: usize) -> Sampled {
         height_m: &|p| object.height_m(p),
         covers: &|p| object.height_m(p).is_some(),
         near: &|_| 1,
+        lattice: None,
     };
     let (areas, mut fine) = areas_m2(&grid, &heights, surface, &Silent).unwrap();
     let index: Vec<usize> = (0..heights.len())

@@ -9,6 +9,7 @@ mod hausdorff;
 pub(super) mod piece;
 mod primitive;
 mod sheets;
+mod standing;
 mod union;
 mod visible;
 
@@ -34,6 +35,7 @@ use self::visible::{HIGHEST, Look, supremum_over_visible};
 pub use self::hausdorff::{Interval, hausdorff};
 pub use self::piece::{Extreme, Patch, Rect};
 pub use self::primitive::{primitive, primitive_by_cell};
+pub(crate) use self::standing::Standing;
 
 /// Triangles in a rectangle that are compared with each other at once.
 const TOGETHER: usize = 10;
