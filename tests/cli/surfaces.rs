@@ -231,6 +231,26 @@ fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
     assert!(number(&resolved["accuracy"]["quadrature"]["estimate"]) < 2e-3);
 }
 
+/// Patches as wide as the deviation were compared with themselves, one random point with nothing.
+#[test]
+fn regression_points_without_coarser_ones_stated_no_error() {
+    let place = Place::new();
+    for flags in [["--max-deviation", "40mm"], ["--poisson", "80mm"]] {
+        let args = [
+            "lambda",
+            "designs/seed_air.toml",
+            "shapes/half_sphere.toml",
+            "--format",
+            "json",
+        ];
+        let found = place.run(&[&args[..], &flags].concat()).ends(0).json();
+        let number = |value: &serde_json::Value| value.as_f64().unwrap();
+        let off = number(&found["sampling"]["relative_change"]).abs();
+        let stated = number(&found["headline"]["force_error"]);
+        assert!(off > 0.01 && stated > 0.3 * off, "{off} {stated}");
+    }
+}
+
 /// An image of 15 kB took 4.5 GB under `--memory 1GB`.
 #[test]
 fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {

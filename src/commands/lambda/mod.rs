@@ -204,9 +204,9 @@ impl LambdaOptions {
 }
 
 impl LambdaReport {
-    /// States how far lambda of graded points is off, from that of wider patches.
-    fn add_quadrature(&mut self, coarser: &LambdaFile) {
-        let Some(stage) = quadrature(&self.file, coarser) else {
+    /// States how far lambda of points on no grid is off.
+    fn add_quadrature(&mut self, stage: Option<StageAccuracy>) {
+        let Some(stage) = stage else {
             return;
         };
         if let Some(headline) = &mut self.file.headline {
@@ -306,9 +306,12 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = whole(&chosen)?;
-    if let Some(coarser) = coarser {
+    // Where patches are as wide as the deviation already, twice as wide ones are the same.
+    if let Some(coarser) = coarser.filter(|other| other.positions_m != chosen.positions_m) {
         let other = solve_with(&coarser, &plain)?.file;
-        report.add_quadrature(&other);
+        report.add_quadrature(quadrature(&report.file, &other));
+    } else if !report.file.accuracy.contains_key("lambda_of_points") {
+        report.add_quadrature(off_grid(&report.file, &grid));
     }
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
@@ -409,6 +412,20 @@ fn quadrature(file: &LambdaFile, coarser: &LambdaFile) -> Option<StageAccuracy> 
         estimate: 1.5 * (coarse / fine - 1.0).abs(),
         relative_to: "lambda".to_owned(),
         method: "an estimate: one and a half times the change from patches twice as wide"
+            .to_owned(),
+    })
+}
+
+/// The same where no coarser points are to be compared with: from the grid's, and what these are off by.
+fn off_grid(file: &LambdaFile, grid: &LambdaFile) -> Option<StageAccuracy> {
+    let here = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0)?;
+    let there = grid.lambda_n_per_m.unwrap_or(0.0);
+    let of_grid = grid.accuracy.get("lambda_of_points");
+    let of_grid = of_grid.map_or(0.0, |stage| stage.estimate * there / here);
+    Some(StageAccuracy {
+        estimate: (there / here - 1.0).abs() + of_grid,
+        relative_to: "lambda".to_owned(),
+        method: "an estimate: the change from the grid's points, and what these are off by"
             .to_owned(),
     })
 }
