@@ -3,7 +3,8 @@
 //! A rectangle is quartered until the surface covers all of it and its patch lies within the deviation
 //! everywhere, certified as for a grid. Where the surface jumps or ends no patch can follow it; there the
 //! quartering stops at rectangles no wider than the deviation, so that the step is known to that in
-//! plan, and what such a rectangle weighs is its area that has surface.
+//! plan, and what such a rectangle weighs is its area that has surface. Where none of its corners has any, a
+//! place that has is a point.
 
 use std::collections::BTreeMap;
 
@@ -55,6 +56,8 @@ struct Work<'a> {
     grading: Grading,
     /// Ordered by y, then x: the order of the output.
     nodes: BTreeMap<Node, Option<(Sample, Marks, f64)>>,
+    /// Points between the nodes.
+    between: Vec<([f64; 2], (Sample, Marks, f64))>,
     found: usize,
     result: Adaptive,
 }
@@ -97,6 +100,7 @@ pub fn adaptive(
         first,
         grading,
         nodes: BTreeMap::new(),
+        between: Vec::new(),
         found: 0,
         result: Adaptive {
             points: Scattered::default(),
@@ -119,15 +123,19 @@ pub fn adaptive(
     progress.end();
     let Work {
         nodes,
+        between,
         mut result,
         first,
         ..
     } = work;
-    for ([row, column], node) in nodes {
-        if let Some((sample, marks, weight_m2)) = node {
-            let p = place(probe, first, [column, row]);
-            result.points.push(p, (sample, marks), weight_m2);
-        }
+    let at_nodes = nodes.into_iter().filter_map(|([row, column], node)| {
+        let p = place(probe, first, [column, row]);
+        Some((p, node?))
+    });
+    let mut all: Vec<_> = at_nodes.chain(between).collect();
+    all.sort_by(|(p, _), (q, _)| p[1].total_cmp(&q[1]).then(p[0].total_cmp(&q[0])));
+    for (p, (sample, marks, weight_m2)) in all {
+        result.points.push(p, (sample, marks), weight_m2);
     }
     Ok(result)
 }
@@ -197,6 +205,10 @@ impl Work<'_> {
             }
         }
         if widest_m <= self.grading.max_deviation_m || level == 0 {
+            if heights.iter().all(Option::is_none) {
+                self.weigh_between(&rect, members, widest_m);
+                return Ok(());
+            }
             self.result.borders += 1;
             self.result.border_m = self.result.border_m.max(widest_m);
             let covered_m2 = self.probe.covered_m2(&rect, members);
@@ -210,6 +222,21 @@ impl Work<'_> {
             self.refine(corner, level - 1, &members)?;
         }
         Ok(())
+    }
+
+    /// Makes a point of the surface over a rectangle between its corners, if there is any.
+    fn weigh_between(&mut self, rect: &Rect, members: &[u32], widest_m: f64) {
+        let Some(standing) = self.probe.standing(rect, members) else {
+            return;
+        };
+        let Some((sample, marks)) = self.probe.at(standing.at_m) else {
+            return;
+        };
+        self.found += 1;
+        self.result.borders += 1;
+        self.result.border_m = self.result.border_m.max(widest_m);
+        let point = (sample, marks, standing.area_m2);
+        self.between.push((standing.at_m, point));
     }
 
     /// Gives a leaf's area to its corners with surface, in equal parts.
