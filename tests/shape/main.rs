@@ -13,3 +13,4 @@ mod more_formats;
 mod points;
 mod solidworks;
 mod stl;
+mod thin_parts;

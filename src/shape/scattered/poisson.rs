@@ -2,27 +2,32 @@
 //!
 //! Darts are thrown into the cells of a grid so fine that each holds one point at most, over and
 //! over in a shuffled order; the stream of numbers depends on the seed alone. A point's weight is
-//! the area nearer to it than to any other, counted on a finer grid; a place counted there that is
-//! a spacing or more from all points becomes one.
+//! the area nearer to it than to any other: that over the cells of a finer grid, each whole for one of its
+//! places; such a place that is a spacing or more from all points becomes one.
 
 use super::{MOST_POINTS, Probe, Scattered, too_many};
+use crate::deviation::{Rect, Standing};
 use crate::error::ShapeError;
-use crate::height::Sample;
+use crate::height::{Grid, Sample};
+use crate::point_areas::LEAST;
 use crate::point_flags::Marks;
 use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::axis::Axis;
 use fluxform_numerics::random::Random;
 
 /// Darts into every free cell.
 const ROUNDS: u64 = 40;
-/// Places a spacing at which areas are counted.
+/// Cells a spacing over which areas are counted.
 const COUNTED: f64 = 4.0;
+/// Cells a side of a block that shares a list of the faces over it.
+const BLOCK: usize = 8;
 
 /// Points at random with a least spacing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Poisson {
     /// The points, weighted by the area nearest to each.
     pub points: Scattered,
-    /// No place of the surface, of those counted, lies farther from a point in plan, m.
+    /// No place of the surface lies farther from a point in plan, m: a bound.
     pub cover_m: f64,
 }
 
@@ -92,11 +97,11 @@ pub fn poisson(
     })
 }
 
-/// Statistics of the counted places of the surface.
+/// Statistics of the surface over the counted cells.
 struct Counted {
     /// The area nearest to each dart, by its cell.
     areas_m2: Vec<f64>,
-    /// The farthest that any place lies from its dart, m.
+    /// No place of these lies farther from its dart, m.
     cover_m: f64,
     /// Places at least a spacing from every dart: narrow parts that none has hit.
     missed: Vec<[f64; 2]>,
@@ -108,37 +113,81 @@ fn count_areas(
     spacing_m: f64,
     progress: &dyn Progress,
 ) -> Result<Counted, ShapeError> {
-    let mut areas_m2 = vec![0.0; cells.darts.len()];
-    let mut missed = Vec::new();
-    let mut farthest = 0.0_f64;
+    let mut counted = Counted {
+        areas_m2: vec![0.0; cells.darts.len()],
+        cover_m: 0.0,
+        missed: Vec::new(),
+    };
     let step_m = spacing_m / COUNTED;
     let sides = probe.plan_m.sides();
-    let count = sides.map(|side| (side / step_m).ceil().max(1.0) as usize);
-    let area_m2 = sides[0] / count[0] as f64 * (sides[1] / count[1] as f64);
-    for k in 0..count[0] * count[1] {
-        let place = [k % count[0], k / count[0]];
-        if place[0] == 0 {
-            progress.check()?;
-        }
-        let p = [0, 1]
-            .map(|k| probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64);
-        if probe.sample(p).is_none() {
-            continue;
-        }
-        let nearest = cells.nearest(p, 2);
-        if let Some((cell, square)) = nearest {
-            areas_m2[cell] += area_m2;
-            farthest = farthest.max(square);
-        }
-        if nearest.is_none_or(|(_, square)| square >= spacing_m * spacing_m) {
-            missed.push(p);
+    let blocks = sides.map(|side| ((side / step_m) as usize).div_ceil(BLOCK).max(1));
+    let axis = |k: usize, samples: usize| Axis {
+        from: probe.plan_m.low_m[k],
+        to: probe.plan_m.high_m[k],
+        samples,
+    };
+    let of_blocks = Grid {
+        x_m: axis(0, blocks[0] + 1),
+        y_m: axis(1, blocks[1] + 1),
+    };
+    let lattice = probe.lattice(&of_blocks, &[]);
+    let nodes = [0, 1].map(|k| axis(k, blocks[k] * BLOCK + 1).nodes());
+    let cell_m2 = sides[0] * sides[1] / ((nodes[0].len() - 1) * (nodes[1].len() - 1)) as f64;
+    let covers = |row: usize| -> Vec<bool> {
+        let places = nodes[0].iter().map(|x| [*x, nodes[1][row]]);
+        places.map(|p| probe.covers(p)).collect()
+    };
+    let mut above = covers(0);
+    for row in 0..nodes[1].len() - 1 {
+        progress.check()?;
+        let below = std::mem::replace(&mut above, covers(row + 1));
+        for column in 0..nodes[0].len() - 1 {
+            let rect = Rect {
+                low_m: [nodes[0][column], nodes[1][row]],
+                high_m: [nodes[0][column + 1], nodes[1][row + 1]],
+            };
+            let has = [&below, &above].map(|has| has[column] && has[column + 1]);
+            let found = if has == [true; 2] && probe.covers(rect.centre()) {
+                Some(Standing {
+                    at_m: rect.centre(),
+                    area_m2: cell_m2,
+                })
+            } else {
+                let block = row / BLOCK * blocks[0] + column / BLOCK;
+                let around = (lattice.as_ref()).map(|lattice| lattice.members(block));
+                let among = around.map(|around| probe.faces_over(&rect, &around));
+                probe.standing(&rect, &among.unwrap_or_default())
+            };
+            if let Some(found) = found {
+                counted.add(cells, &rect, found, spacing_m);
+            }
         }
     }
-    Ok(Counted {
-        areas_m2,
-        cover_m: farthest.sqrt(),
-        missed,
-    })
+    // A point counts, however little.
+    for (area, dart) in counted.areas_m2.iter_mut().zip(&cells.darts) {
+        if dart.is_some() {
+            *area = area.max(LEAST * cell_m2);
+        }
+    }
+    Ok(counted)
+}
+
+impl Counted {
+    /// Counts the surface over a cell for the dart nearest to its place.
+    fn add(&mut self, cells: &Cells, rect: &Rect, found: Standing, spacing_m: f64) {
+        let nearest = cells.nearest(found.at_m, 2);
+        if let Some((cell, _)) = nearest {
+            self.areas_m2[cell] += found.area_m2;
+            // The farthest place of a rectangle is a corner.
+            let dart = cells.darts[cell].map_or(found.at_m, |(dart, ..)| dart);
+            let corners = rect.corners().into_iter();
+            let distances = corners.map(|p| (p[0] - dart[0]).hypot(p[1] - dart[1]));
+            self.cover_m = distances.fold(self.cover_m, f64::max);
+        }
+        if nearest.is_none_or(|(_, square)| square >= spacing_m * spacing_m) {
+            self.missed.push(found.at_m);
+        }
+    }
 }
 
 impl Cells {
