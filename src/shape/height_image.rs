@@ -14,7 +14,7 @@ use crate::read_error::ReadError;
 
 /// More pixels than this are more triangles than a computer holds.
 const MOST_PIXELS: u64 = 50_000_000;
-/// Grey levels of the two depths.
+/// Highest grey levels of the two depths that images are read in.
 const LEVELS: [f64; 2] = [255.0, 65535.0];
 
 /// True for bytes that begin as PNG files do.
@@ -38,6 +38,8 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(damaged)?;
     let (width, height) = reader.info().size();
+    // Of the file: samples of less than 8 bit are widened to the same heights.
+    let bits = reader.info().bit_depth as u8;
     let pixels = u64::from(width) * u64::from(height);
     if width < 2 || height < 2 || pixels > MOST_PIXELS {
         let what = format!(
@@ -81,19 +83,24 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     }
     let mut warnings = Vec::new();
     if !wide {
-        warnings.push(
-            "the image has 8 bit: its heights are steps of 1/255 of its range; save it with 16 bit"
-                .into(),
-        );
+        warnings.push(format!(
+            "the image has {bits} bit: its heights are steps of 1/{} of its range; save it with 16 bit",
+            highest_level(bits)
+        ));
     }
     Ok(FileMesh {
         triangles,
         // Pixels are exact, as far as doubles are; heights are known to half a level.
         coordinate_rounding: f64::from(width.max(height)) * f64::EPSILON,
-        level_rounding: 0.5 / LEVELS[usize::from(wide)],
+        level_rounding: 0.5 / highest_level(bits),
         warnings,
         ..FileMesh::default()
     })
+}
+
+/// The highest grey level of so many bits.
+fn highest_level(bits: u8) -> f64 {
+    f64::from((1_u32 << bits) - 1)
 }
 
 struct Image<'a> {

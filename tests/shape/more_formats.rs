@@ -232,6 +232,30 @@ fn a_height_image_is_a_surface_over_its_pixels() {
     }
 }
 
+/// Levels of 1, 2 and 4 bit were counted after they were widened: half a step was stated as 0.002 of the range.
+#[test]
+fn regression_few_grey_levels_were_taken_for_256() {
+    for (depth, highest) in [
+        (png::BitDepth::One, 1.0),
+        (png::BitDepth::Two, 3.0),
+        (png::BitDepth::Four, 15.0),
+        (png::BitDepth::Eight, 255.0),
+    ] {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 8, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header().unwrap();
+        let row = usize::from(depth as u8);
+        writer.write_image_data(&vec![0x5a; 2 * row]).unwrap();
+        writer.finish().unwrap();
+        let mesh = read(SurfaceFormat::HeightImage, &bytes).unwrap();
+        assert_eq!(mesh.level_rounding, 0.5 / highest);
+        let stated = format!("{} bit: its heights are steps of 1/{highest} ", depth as u8);
+        assert!(mesh.warnings[0].contains(&stated), "{:?}", mesh.warnings);
+    }
+}
+
 /// Half a grey level of a high image was a reach in plan: holes closed, and rims grew by pixels.
 #[test]
 fn coarse_grey_levels_leave_the_plan_of_an_image_alone() {
