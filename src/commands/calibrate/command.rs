@@ -192,16 +192,12 @@ impl Calibrate {
         let json = printer.with_warnings(&report);
         let folder = options.out.join(&design.name);
         printer.summary(Stream::Output, &json, || summary(design, &report, &folder))?;
+        let bundles = || report.bundles.iter();
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
-        let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
+        let missed: Vec<String> = bundles().flat_map(missed).collect();
         accuracy_check(&missed)?;
-        report
-            .bundles
-            .iter()
-            .try_for_each(|bundle| well_placed(&bundle.lambda))?;
-        let constants: Vec<(&str, Option<f64>)> = report
-            .bundles
-            .iter()
+        bundles().try_for_each(|bundle| well_placed(&bundle.lambda))?;
+        let constants: Vec<(&str, Option<f64>)> = bundles()
             .map(|b| (b.manifest.shape.as_str(), b.lambda.file.lambda_n_per_m))
             .collect();
         rendered(&constants)

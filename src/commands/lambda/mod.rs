@@ -28,8 +28,7 @@ use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 use self::placement::Placed;
 pub(crate) use self::points::{ForcePoints, ForcesAt};
-use super::discretize::scattered;
-use super::discretize::scattered::ScatteredSummary;
+use super::discretize::scattered::{self, ScatteredReport, ScatteredSummary};
 use super::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
@@ -255,15 +254,11 @@ pub fn run(
         .map(|how| resolving(how, of_grid.lowest_m()));
     let sample = |how| scattered::run(document, inputs.clone(), how, progress);
     let sampled = sampling.map(sample).transpose()?;
-    let chosen = sampled
-        .as_ref()
-        .map(ForcePoints::of_scattered)
-        .transpose()?;
-    let coarser = sampling.and_then(coarser).map(sample).transpose()?;
-    let coarser = coarser
-        .as_ref()
-        .map(ForcePoints::of_scattered)
-        .transpose()?;
+    let points_of = |report: &Option<ScatteredReport>| {
+        (report.as_ref().map(ForcePoints::of_scattered)).transpose()
+    };
+    let chosen = points_of(&sampled)?;
+    let coarser = points_of(&sampling.and_then(coarser).map(sample).transpose()?)?;
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
     let lowest_m = lowest_place_m(&scene, &of_all, options);
     progress.begin("steel", 1);

@@ -116,22 +116,29 @@ pub(super) fn section(
     let surface = Surface::new(object);
     let mut body = Html::default();
     let step = surface.step();
-    let thinned = if step > 1 {
+    let drawn = surface.height_m.iter().flatten().count();
+    let mut left_out = if step > 1 {
         format!(" Of every {step} x {step} points the one most in error is drawn.")
     } else {
         String::new()
     };
+    if drawn < object.points.len() {
+        left_out += &format!(
+            " {} between them, where the surface ends or bends, are not drawn: the table of errors has all.",
+            count(object.points.len() - drawn, "point")
+        );
+    }
     body.raw("<div class=\"pair\">");
     figure(
         &mut body,
         "turn",
         "The surface with its constraint points above the coils, in three dimensions",
         &format!(
-            "The surface that the finger's magnet follows, its {} and the coils below, \
-             windings darker with more current; the ring is where the force is most wrong. Faces \
+            "The surface that the finger's magnet follows, the {} of its grid and the coils below, \
+             windings darker with more current; the ring is where, of these, the force is most wrong. Faces \
              that plunge at a rim are left open. Drag, use the arrow keys or the buttons \
-             to turn it.{thinned}",
-            count(object.points.len(), "constraint point")
+             to turn it.{left_out}",
+            count(drawn, "constraint point")
         ),
     );
     if object.lambda.lambda_n_per_m.is_some() {
@@ -145,7 +152,7 @@ pub(super) fn section(
         data.insert("errors".to_owned(), json!(true));
     }
     body.raw("</div>");
-    if let Some(table) = shares(&surface) {
+    if let Some(table) = shares(object) {
         body.folded_table(&table);
     }
     data.insert("surface".to_owned(), surface.json());
@@ -157,8 +164,10 @@ pub(super) fn section(
 }
 
 /// How the errors are spread, for those who cannot see the map.
-fn shares(surface: &Surface) -> Option<Table> {
-    let mut errors: Vec<f64> = surface.error_n.iter().flatten().copied().collect();
+fn shares(object: &CalibratedObject) -> Option<Table> {
+    let forces = object.curves.chosen.as_ref()?;
+    let pairs = forces.static_n.iter().zip(&forces.requested_n);
+    let mut errors: Vec<f64> = pairs.map(|(given, target)| given - target).collect();
     errors.sort_by(f64::total_cmp);
     let last = errors.len().checked_sub(1)?;
     let at = |part: f64| errors[(part * last as f64).round() as usize];
@@ -173,9 +182,9 @@ fn shares(surface: &Surface) -> Option<Table> {
     ];
     let row = |(name, part): (&str, f64)| vec![Cell::from(name), force(at(part)).into()];
     let mut rows: Vec<Vec<Cell>> = parts.into_iter().map(row).collect();
-    let heights: Vec<f64> = surface.height_m.iter().flatten().copied().collect();
-    let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let heights = || object.points.iter().map(|row| row.height_m);
+    let low = heights().fold(f64::INFINITY, f64::min);
+    let high = heights().fold(f64::NEG_INFINITY, f64::max);
     rows.push(vec![
         "heights of the points".into(),
         format!("{} to {} mm", figures(low * 1e3, 4), figures(high * 1e3, 4)).into(),

@@ -149,7 +149,8 @@ function paintAxes(pen, scene, view) {
   pen.textAlign = "center";
   const label = (text, p, dx, dy) => {
     const [a, b] = view(...p);
-    pen.fillText(text, a + dx, b + dy + 4);
+    const before = pen.measureText(text).width * (pen.textAlign === "right" ? 1 : 0.5);
+    pen.fillText(text, Math.max(a + dx, before + 2), b + dy + 4);
   };
   // Labels stand off from their edge, away from the floor's middle.
   const off = (p) => {
