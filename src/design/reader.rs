@@ -326,12 +326,12 @@ impl<'a> Section<'a> {
             .collect();
         unknown.sort_by_key(|key| key.span().start);
         for (number, key) in unknown.into_iter().enumerate() {
-            let fault = self.unknown(key.get_ref()).at(&key.span());
+            let mut fault = self.unknown(key.get_ref()).at(&key.span());
             // Faults are shown in this order; advice takes far longer than the rest.
-            self.sink.add(match number < SHOWN_MAX {
-                true => fault.help(self.advice(key.get_ref())),
-                false => fault,
-            });
+            if number < SHOWN_MAX {
+                fault = fault.help(self.advice(key.get_ref()));
+            }
+            self.sink.add(fault);
         }
     }
 

@@ -105,6 +105,6 @@ mod tests {
             })
             .collect();
         let found = area_m2(&slivers);
-        assert!((found - 1.3).abs() < 1e-11, "{found}");
+        assert!((found - 1.3).abs() < 1e-12, "{found}");
     }
 }
