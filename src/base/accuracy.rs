@@ -65,7 +65,11 @@ impl StageAccuracy {
             relative_to,
             ..
         } = self;
-        format!("{name}: {estimate:.1e} of {relative_to}, above {tolerance:.1e}")
+        // As many digits as show that one is above the other.
+        let differs =
+            |digits: &usize| format!("{estimate:.digits$e}") != format!("{tolerance:.digits$e}");
+        let digits = (1..17).find(differs).unwrap_or(1);
+        format!("{name}: {estimate:.digits$e} of {relative_to}, above {tolerance:.digits$e}")
     }
 }
 
@@ -156,6 +160,10 @@ mod tests {
         assert_eq!(
             of(1.9e-6),
             ["inductance: 2.0e-6 of the field, above 1.9e-6"]
+        );
+        assert_eq!(
+            of(1.996e-6),
+            ["inductance: 2.000e-6 of the field, above 1.996e-6"]
         );
         assert_eq!(of(1e-6).len(), 2);
         assert_eq!(of(f64::NAN).len(), 2);

@@ -77,6 +77,11 @@ fn iron_summary(
                  has the coils among all steel";
     warnings.push(alone.to_owned());
     let passive_force_n = iron_pull(scene)?.map(|(force_n, stage)| {
+        warnings.extend(passive::warning(
+            &stage,
+            passive::PASSIVE_TOLERANCE.max(scene.tolerances.forces),
+            force_n,
+        ));
         accuracy.insert("iron_passive_force", stage);
         force_n
     });

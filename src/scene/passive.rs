@@ -273,3 +273,33 @@ pub fn accuracy(pull: &Pull) -> StageAccuracy {
             .to_owned(),
     }
 }
+
+/// A sentence on a pull of `force_n` whose stated error is above `tolerance`.
+#[must_use]
+pub fn warning(stage: &StageAccuracy, tolerance: f64, force_n: f64) -> Option<String> {
+    (!stage.meets(tolerance)).then(|| {
+        let error = stage.estimate;
+        format!(
+            "the pull of the unpowered steel has a stated error of {error:.1e} of itself ({:.1e} N), above \
+             its tolerance {tolerance:.1e}",
+            error * force_n.abs()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pull_beyond_its_tolerance_is_warned_of_with_its_error_in_newtons() {
+        let stage = StageAccuracy {
+            estimate: 0.127,
+            relative_to: String::new(),
+            method: String::new(),
+        };
+        assert_eq!(warning(&stage, 0.127, -0.0357), None);
+        let warned = warning(&stage, 0.01, -0.0357).unwrap();
+        assert!(warned.contains("1.3e-1 of itself (4.5e-3 N)"), "{warned}");
+    }
+}

@@ -387,6 +387,11 @@ impl Single {
                 }
                 passive_force_n = Some(pulled_n[2]);
                 let stage = passive::accuracy(&pull);
+                self.warnings.extend(passive::warning(
+                    &stage,
+                    passive::PASSIVE_TOLERANCE,
+                    pulled_n[2],
+                ));
                 self.accuracy.insert("passive_force", stage);
             }
         }

@@ -311,7 +311,7 @@ fn left_out(scene: &Scene, request: &BenchRequest) -> Vec<LeftOutKnob> {
     let mut all = vec![one(
         "criterion",
         "no knob of error against time: all force constants are read off one path and take the same \
-         time; their errors at the present settings are under `constants`",
+         time; their errors at the present settings are listed by force constant",
     )];
     all.push(match &scene.core {
         None => one(

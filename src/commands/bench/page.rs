@@ -30,7 +30,7 @@ const SHOWN: [Shown; 2] = [
     },
     Shown {
         name: "felt",
-        label: "largest error of the felt force, relative to the force to be felt",
+        label: "relative error of the felt force",
         of: |run| run.felt_error,
     },
 ];

@@ -268,10 +268,11 @@ impl Search<'_> {
             }
             let above = |p: Point| face.height(p) - patch.height_m(p);
             let below = |p: Point| -above(p);
-            let Some(above) = supremum_over_visible(face, &polygon, &others, look, &above) else {
+            let piece = (leaf.rect, &polygon);
+            let Some(above) = supremum_over_visible(face, piece, &others, look, &above) else {
                 continue;
             };
-            let below = supremum_over_visible(face, &polygon, &others, look, &below);
+            let below = supremum_over_visible(face, piece, &others, look, &below);
             let bound_m = below.map_or(above, |below| above.or(below)).value_m;
             let part = Part {
                 face: *face,

@@ -328,7 +328,8 @@ impl Faces {
             let others: Vec<_> = faces.map(|face| self.list[*face as usize]).collect();
             open = piece::Face::floor(leaf.rect, floor_m).is_none_or(|floor| {
                 let whole = floor.within(leaf.rect);
-                supremum_over_visible(&floor, &whole, &others, look, &|_| 0.0).is_some()
+                supremum_over_visible(&floor, (leaf.rect, &whole), &others, look, &|_| 0.0)
+                    .is_some()
             });
         });
         !open && !self.effort.is_spent()
@@ -382,7 +383,8 @@ impl Faces {
                 break;
             }
             let value = |p: piece::Point| patch.height_m(p) - face.height(p);
-            if let Some(below) = supremum_over_visible(face, part, &others, self.look(), &value) {
+            let piece = (leaf.rect, part);
+            if let Some(below) = supremum_over_visible(face, piece, &others, self.look(), &value) {
                 worst.below = worst.below.or(below);
             }
         }

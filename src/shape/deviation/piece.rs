@@ -49,6 +49,14 @@ impl Rect {
         [[x, y], [u, y], [u, v], [x, v]]
     }
 
+    /// The part of a segment inside.
+    pub(super) fn along(&self, segment: Segment) -> Option<Segment> {
+        (0..2).try_fold(segment, |part, k| {
+            part.cut(|p| p[k] - self.low_m[k])?
+                .cut(|p| self.high_m[k] - p[k])
+        })
+    }
+
     /// The two halves along an axis.
     pub(super) fn halves(&self, k: usize) -> [Self; 2] {
         let (mut lower, mut upper) = (*self, *self);
@@ -68,6 +76,38 @@ impl Rect {
                 high_m: [0, 1].map(|k| pick(k, middle[k], self.high_m[k])),
             }
         })
+    }
+}
+
+/// A part of a straight line in plan.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
+    /// Two places on the line, m.
+    pub(super) ends_m: [Point; 2],
+    /// Where the part begins and ends, as fractions of the way from one to the other.
+    pub(super) part: [f64; 2],
+}
+
+impl Segment {
+    fn at(&self, t: f64) -> Point {
+        let [a, b] = self.ends_m;
+        [0, 1].map(|k| a[k] + t * (b[k] - a[k]))
+    }
+
+    /// The part of it where the function, linear along it, is not negative.
+    fn cut(mut self, inside: impl Fn(Point) -> f64) -> Option<Self> {
+        let [from, to] = self.part;
+        let [start, end] = self.part.map(|t| inside(self.at(t)));
+        if start < 0.0 && end < 0.0 {
+            return None;
+        }
+        let zero = from + (to - from) * (start / (start - end));
+        if start < 0.0 {
+            self.part[0] = zero;
+        } else if end < 0.0 {
+            self.part[1] = zero;
+        }
+        (self.part[0] < self.part[1]).then_some(self)
     }
 }
 
@@ -190,13 +230,23 @@ impl Face {
         self.origin[2] + rise
     }
 
+    /// Distance of a point of the plan from the line of a side, positive inside, times the side's length, m^2.
+    fn inward_m2(&self, k: usize, p: Point) -> f64 {
+        let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+    }
+
     /// Whether a point of the plan lies in the triangle or no farther than `slack_m` beyond a side.
     pub(super) fn holds(&self, p: Point, slack_m: f64) -> bool {
         (0..3).all(|k| {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
-            let (u, v) = (b[0] - a[0], b[1] - a[1]);
-            u * (p[1] - a[1]) - v * (p[0] - a[0]) >= -slack_m * u.hypot(v)
+            self.inward_m2(k, p) >= -slack_m * (b[0] - a[0]).hypot(b[1] - a[1])
         })
+    }
+
+    /// The part of a segment over the triangle.
+    pub(super) fn along(&self, segment: Segment) -> Option<Segment> {
+        (0..3).try_fold(segment, |part, k| part.cut(|p| self.inward_m2(k, p)))
     }
 
     /// Length in space of a step along an axis.
@@ -279,11 +329,19 @@ impl Face {
                 return Polygon::of(&[]);
             }
         }
-        let mut part = *polygon;
-        for k in 0..3 {
-            let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
-            part = part.cut(|p| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]));
-        }
+        let part = (0..3).fold(*polygon, |part, k| part.cut(|p| self.inward_m2(k, p)));
+        part.cut(|p| self.height(p) - other.height(p) - margin)
+    }
+
+    /// The part of a segment over `other` that [`Self::hides`] has inside. Cut by the triangle's own lines: those
+    /// of a region's short sides have lost their direction to rounding.
+    pub(super) fn hides_along(
+        &self,
+        other: &Self,
+        segment: Segment,
+        margin: f64,
+    ) -> Option<Segment> {
+        let part = self.along(segment)?;
         part.cut(|p| self.height(p) - other.height(p) - margin)
     }
 }

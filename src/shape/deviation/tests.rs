@@ -5,6 +5,7 @@ use crate::document::Placement;
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::placement::Transform;
 use fluxform_base::progress::Silent;
+use fluxform_numerics::random::Random;
 
 fn placed(triangles: Vec<Triangle>) -> Mesh {
     let file = FileMesh {
@@ -161,5 +162,59 @@ fn a_grid_without_cells_has_no_faces() {
         let lattice = Lattice::new(&faces, &grid, &known);
         assert_eq!(lattice.len(), 0);
         assert_eq!(vertical_by_cell(&lattice, &Silent).unwrap(), []);
+    }
+}
+
+/// Where its nodes are a grid's within rounding, a lower sheet was seen through the same sheet above it.
+#[test]
+fn a_thick_sheet_hides_its_underside() {
+    const CELLS: usize = 60;
+    let mut random = Random::new(1);
+    let at = |k: usize| -40.0 + (80.0 * k as f64 / CELLS as f64 * 1e7).round() * 1e-7;
+    let corner = |i: usize, j: usize, depth: f64| {
+        let (x, y) = (at(i), at(j));
+        [
+            x,
+            y,
+            40.0 - depth + 6.0 * (x / 17.0).cos() * (y / 13.0).sin(),
+        ]
+        .map(|mm| mm * 1e-3)
+    };
+    let mut triangles = Vec::new();
+    for (j, i) in (0..CELLS).flat_map(|j| (0..CELLS).map(move |i| (j, i))) {
+        let rising = random.between(0.0, 1.0) < 0.5;
+        for depth in [0.0, 20.0] {
+            let at = |di, dj| corner(i + di, j + dj, depth);
+            triangles.extend(if rising {
+                [
+                    [at(0, 0), at(1, 0), at(1, 1)],
+                    [at(0, 0), at(1, 1), at(0, 1)],
+                ]
+            } else {
+                [
+                    [at(0, 0), at(1, 0), at(0, 1)],
+                    [at(1, 0), at(1, 1), at(0, 1)],
+                ]
+            });
+        }
+    }
+    let mesh = placed(triangles);
+    for samples in [61, 121] {
+        let axis = Axis {
+            from: -0.04,
+            to: 0.04,
+            samples,
+        };
+        let grid = Grid {
+            x_m: axis,
+            y_m: axis,
+        };
+        let known = heights(&mesh, &grid, &Silent).unwrap();
+        let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
+        let faces = Faces::new(&mesh, &grid, Looks::endless());
+        let lattice = Lattice::new(&faces, &grid, &known);
+        let worst = vertical(&mesh, &grid, &lattice, &Silent).unwrap();
+        let most_m = worst.above.value_m.max(worst.below.value_m);
+        assert!(most_m < 1e-3, "{samples}: {worst:?}");
     }
 }

@@ -6,7 +6,7 @@
 //! outside the region, so that what is shared with a neighbour needs no exact arithmetic.
 
 use super::Looks;
-use super::piece::{Extreme, Face, Hair, Point, Polygon, along};
+use super::piece::{Extreme, Face, Hair, Point, Polygon, Rect, Segment, along};
 
 /// How a piece is looked at: the resolution, and how much may yet be looked at.
 #[derive(Clone, Copy)]
@@ -21,11 +21,11 @@ const CUTS: usize = 4;
 /// So many of the others are looked at first: what they hide needs no more.
 pub(super) const HIGHEST: usize = 16;
 
-/// The largest value over the visible part of `piece`, a part of `face`; `None` when it is hidden,
-/// or where the effort is spent. Among many `others` the highest should come first.
+/// The largest value over the visible part of `piece`, the part of `face` within `rect`; `None` when it is
+/// hidden, or where the effort is spent. Among many `others` the highest should come first.
 pub(super) fn supremum_over_visible(
     face: &Face,
-    piece: &Polygon,
+    (rect, piece): (&Rect, &Polygon),
     others: &[Face],
     look: Look<'_>,
     value: &impl Fn(Point) -> f64,
@@ -35,14 +35,14 @@ pub(super) fn supremum_over_visible(
         return None;
     }
     if others.len() > HIGHEST
-        && supremum_over_visible(face, piece, &others[..HIGHEST], look, value).is_none()
+        && supremum_over_visible(face, (rect, piece), &others[..HIGHEST], look, value).is_none()
     {
         return None;
     }
-    let regions: Vec<Polygon> = others
+    let regions: Vec<(&Face, Polygon)> = others
         .iter()
-        .map(|other| other.hides(face, piece, hair.height_m))
-        .filter(|region| region.width() > hair.plan_m / 4.0)
+        .map(|other| (other, other.hides(face, piece, hair.height_m)))
+        .filter(|(_, region)| region.width() > hair.plan_m / 4.0)
         .collect();
     if regions.is_empty() {
         return Some(piece.supremum(value));
@@ -61,14 +61,19 @@ pub(super) fn supremum_over_visible(
         // To the left of a -> b lies the inside of a counter-clockwise polygon.
         let step = turn * hair.plan_m / length;
         let offset = [-(b[1] - a[1]) * step, (b[0] - a[0]) * step];
-        let beside = [a, b].map(|p| [p[0] + offset[0], p[1] + offset[1]]);
-        let Some(mut open) = crossing(piece, beside, hair.plan_m) else {
+        let beside = Segment {
+            ends_m: [a, b].map(|p| [p[0] + offset[0], p[1] + offset[1]]),
+            part: [0.0, 1.0],
+        };
+        let Some(beside) = rect.along(beside).and_then(|part| face.along(part)) else {
             return;
         };
+        let mut open = beside.part;
         hidden.clear();
         let slack = 8.0 * hair.plan_m / length;
-        for region in &regions {
-            if let Some([from, to]) = crossing(region, beside, hair.plan_m) {
+        for (other, _) in &regions {
+            if let Some(behind) = other.hides_along(face, beside, hair.height_m) {
+                let [from, to] = behind.part;
                 hidden.push([from - slack, to + slack]);
             }
         }
@@ -88,58 +93,10 @@ pub(super) fn supremum_over_visible(
     for (a, b) in piece.sides() {
         consider(a, b, 1.0, &mut best);
     }
-    for region in &regions {
+    for (_, region) in &regions {
         for (a, b) in region.sides() {
             consider(a, b, -1.0, &mut best);
         }
     }
     best
-}
-
-/// The part of a segment inside a convex polygon, as fractions of it.
-fn crossing(polygon: &Polygon, [from, to]: [Point; 2], hair_m: f64) -> Option<[f64; 2]> {
-    let (mut first, mut last) = (0.0_f64, 1.0_f64);
-    for (a, b) in polygon.sides() {
-        // Two cuts through one corner leave it twice; what lies between has no direction.
-        if (b[0] - a[0]).abs().max((b[1] - a[1]).abs()) < hair_m / 16.0 {
-            continue;
-        }
-        let side = |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-        let (start, end) = (side(from), side(to));
-        if start < 0.0 && end < 0.0 {
-            return None;
-        }
-        if start < 0.0 {
-            first = first.max(start / (start - end));
-        } else if end < 0.0 {
-            last = last.min(start / (start - end));
-        }
-    }
-    (first < last).then_some([first, last])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_segment_is_cut_where_it_crosses_the_polygon() {
-        let square = Polygon::of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
-        let close = |found: Option<[f64; 2]>, requested: [f64; 2]| {
-            let found = found.unwrap();
-            assert!(
-                (0..2).all(|k| (found[k] - requested[k]).abs() < 1e-15),
-                "{found:?}"
-            );
-        };
-        close(
-            crossing(&square, [[-0.7, 0.3], [1.3, 0.3]], 1e-9),
-            [0.35, 0.85],
-        );
-        close(
-            crossing(&square, [[0.2, 0.7], [0.4, 1.3]], 1e-9),
-            [0.0, 0.5],
-        );
-        assert!(crossing(&square, [[-0.7, 1.3], [1.3, 1.3]], 1e-9).is_none());
-    }
 }
