@@ -20,6 +20,8 @@ use rayon::prelude::*;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::solve::constant;
 
+/// The difference from nothing, and from what cannot be known.
+const ALL: f64 = 1.0;
 /// Ways to lay blocks of two by two cells; of scattered points every fourth is taken.
 const SUBSETS: usize = 4;
 /// The rounding error of a weight, relative to the largest.
@@ -47,6 +49,8 @@ pub struct GridPlaces<'a> {
     pub index: &'a [usize],
     /// Whether each cell, x fastest, is smooth; empty where all are.
     pub smooth: &'a [bool],
+    /// The height over the middle of a smooth cell is within this share of the mean of its corners.
+    pub smooth_within: f64,
 }
 
 /// Samples of the cells that are not smooth, one entry each, and what is left to the points.
@@ -72,8 +76,8 @@ pub struct FineSamples<'a> {
 /// against the limit of ever more points. `areas` holds the plan area that each point stands for (> 0,
 /// any unit), whether or not the problem weighs by it; `fine` takes the place of the points in cells
 /// that are not smooth. Of points on no grid (`places` is `None`) every fourth is taken, which is an
-/// estimate where they are spread at random. `None` where a subset has no constant, and for fewer than
-/// three points along both axes.
+/// estimate where they are spread at random. A rule without a constant, or with 0, differs by all of it; so it
+/// does where there is no rule to compare with: fewer than three points along an axis of several.
 ///
 /// # Errors
 /// A malformed problem.
@@ -84,7 +88,7 @@ pub fn limit_error(
     places: Option<GridPlaces>,
     fine: Option<FineSamples>,
     settings: &Settings,
-) -> Result<Option<f64>, ProblemError> {
+) -> Result<f64, ProblemError> {
     let settings = Settings {
         at_n_per_m: None,
         ..*settings
@@ -105,78 +109,68 @@ pub fn limit_error(
         Some(fine) => (fine.point_areas, with_samples(fine)?),
         None => (areas, by_points),
     };
-    let (Some(by_points), Some(nearest)) = (by_points, nearest) else {
-        return Ok(None);
+    let Some(nearest) = nearest else {
+        return Ok(ALL);
     };
+    let apart = |other: Option<f64>| other.map_or(ALL, |other| (other / nearest - 1.0).abs());
     let differs = |points: &[f64], samples: Option<&[f64]>| -> Result<_, ProblemError> {
         let rows = Rows::of(problem, points, fine.zip(samples));
-        let other = rows.constant(problem, &settings)?;
-        Ok(other.map(|other| (other / nearest - 1.0).abs()))
+        Ok(apart(rows.constant(problem, &settings)?))
     };
-    let of_cells = (by_points / nearest - 1.0).abs();
+    let of_cells = apart(by_points);
     let of_spacing = match places {
-        Some(places) if places.columns.max(places.rows) < 3 => None,
         Some(places) => spacing_off(places, areas, (of_cells, fine), differs)?,
-        None => every_fourth_off(areas, differs)?,
+        None => largest(&[0, 1, 2, 3], |&which| {
+            differs(&every_fourth(areas, which), None)
+        })?,
     };
     let of_samples = match fine {
         Some(fine) => differs(areas, Some(fine.coarse_areas))?,
-        None => Some(0.0),
-    };
-    let Some(of_samples) = of_samples else {
-        return Ok(None);
+        None => 0.0,
     };
     let off = (lambda_n_per_m / nearest - 1.0).abs();
     let counted = match fine {
         Some(fine) if fine.are_points => LEFT_OF_CELLS * of_cells,
         _ => of_cells,
     };
-    Ok(of_spacing
-        .map(|of_spacing| off + MARGIN * of_spacing + counted + MARGIN_OF_SAMPLES * of_samples))
+    Ok(off + MARGIN * of_spacing + counted + MARGIN_OF_SAMPLES * of_samples)
 }
 
-/// By how much rules of twice the spacing differ; `None` where one has no constant or there is nothing to compare.
+/// By how much rules of twice the spacing differ.
 fn spacing_off(
     places: GridPlaces,
     areas: &[f64],
     (of_cells, fine): (f64, Option<FineSamples>),
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError> + Sync,
-) -> Result<Option<f64>, ProblemError> {
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<f64, ProblemError> + Sync,
+) -> Result<f64, ProblemError> {
     let ways = (0..SUBSETS).map(|which| places.blocks(areas, which));
     let ways: Vec<(Vec<f64>, f64)> = ways.collect();
     let most = ways.iter().map(|(_, share)| *share).fold(0.0, f64::max);
     if most == 0.0 {
-        // Single smooth cells between samples: their corners are no worse than those of the others were.
-        return Ok(fine.map(|fine| {
+        // Single smooth cells between samples. Where those are not points, the smooth corners are no worse than those
+        // of the others were; else the least is known by which they are called smooth.
+        return Ok(fine.map_or(ALL, |fine| {
             let [smooth, others] = [areas, fine.areas].map(|of| of.iter().sum::<f64>());
-            SPACING_TO_ERROR * of_cells * smooth / others
+            SPACING_TO_ERROR
+                * match fine.are_points {
+                    true => places.smooth_within * smooth / (smooth + others),
+                    false => of_cells * smooth / others,
+                }
         }));
     }
     let ways: Vec<_> = (ways.iter().filter(|(_, share)| *share > 0.5 * most)).collect();
     largest(&ways, |(weights, share)| {
-        let off = differs(weights, fine.map(|fine| fine.areas))?;
-        Ok(off.map(|off| off / share))
+        Ok(differs(weights, fine.map(|fine| fine.areas))? / share)
     })
 }
 
-/// The same where every fourth of points on no grid is taken.
-fn every_fourth_off(
-    areas: &[f64],
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<Option<f64>, ProblemError> + Sync,
-) -> Result<Option<f64>, ProblemError> {
-    let ways: Vec<usize> = (0..SUBSETS).collect();
-    largest(&ways, |&which| differs(&every_fourth(areas, which), None))
-}
-
-/// The largest value of `off` over all `ways`, which are looked at side by side; `None` where one has none.
+/// The largest value of `off` over all `ways`, which are looked at side by side.
 fn largest<T: Sync>(
     ways: &[T],
-    off: impl Fn(&T) -> Result<Option<f64>, ProblemError> + Sync,
-) -> Result<Option<f64>, ProblemError> {
+    off: impl Fn(&T) -> Result<f64, ProblemError> + Sync,
+) -> Result<f64, ProblemError> {
     let found: Vec<_> = ways.par_iter().map(&off).collect();
-    found.into_iter().try_fold(Some(0.0_f64), |most, off| {
-        Ok(most.zip(off?).map(|(most, off)| most.max(off)))
-    })
+    (found.into_iter()).try_fold(0.0_f64, |most, off| Ok(most.max(off?)))
 }
 
 fn every_fourth(areas: &[f64], which: usize) -> Vec<f64> {
@@ -333,7 +327,7 @@ impl Rows {
             ..*problem
         };
         match constant(&rows, settings) {
-            // Too weak at these points alone: there is nothing to compare.
+            // Too weak at these points alone.
             Err(ProblemError::TooWeak { .. }) => Ok(None),
             other => Ok(other?.filter(|lambda| *lambda > 0.0)),
         }

@@ -23,6 +23,7 @@ use crate::deviation::Lattice;
 use crate::height::Grid;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
+use fluxform_numerics::random::Random;
 
 /// How often a cell that is not smooth is quartered: at most, and where that gives too many samples at least.
 const DEPTHS: std::ops::RangeInclusive<u32> = 2..=4;
@@ -33,10 +34,13 @@ const MOST_SAMPLES: usize = 65_536;
 const MOST_MET: usize = 1 << 26;
 /// Looks that a cell takes at least, about: the corners of its quarters, doubled by every further quartering.
 const LEAST_LOOKS: usize = 9;
-/// Cells that are sampled, at most: those that depart most from their corners.
+/// Cells that are sampled, at most.
 const MOST_CELLS: usize = 4096;
+/// Of cells with surface at all corners, the fewest that stand for more of them: the mean of fewer is less sure
+/// than the corners.
+const FEWEST_CHOSEN: usize = 1024;
 /// A cell of the grid is smooth whose middle departs by less than this share of its height from its corners' mean.
-const SMOOTH: f64 = 4e-3;
+pub const SMOOTH: f64 = 4e-3;
 /// Bisections of a side: to 2e-5 of it.
 const BISECTIONS: u32 = 16;
 /// The least that a point stands for, of a cell: no point counts for nothing.
@@ -119,14 +123,24 @@ pub fn areas_m2(
     progress: &dyn Progress,
 ) -> Result<(Vec<f64>, FineCells), Interrupted> {
     let mut areas = vec![0.0; heights_m.len()];
-    let (broken, beyond) = broken_cells(grid, heights_m, surface, progress)?;
+    let Broken {
+        cells,
+        left,
+        thinned,
+    } = broken_cells(grid, heights_m, surface, progress)?;
     let mut fine = FineCells::default();
-    if !broken.is_empty() {
+    if !cells.is_empty() {
         fine.smooth = vec![true; (grid.x_m.samples - 1) * (grid.y_m.samples - 1)];
         fine.point_area_m2 = vec![0.0; heights_m.len()];
-        let mut all = sampled(grid, &broken, surface, progress)?;
+        let mut all = sampled(grid, &cells, surface, progress)?;
         // Surface that no point stands for is never left out.
-        let left = if all.is_empty() { broken } else { beyond };
+        let left = if all.is_empty() { cells } else { left };
+        if !all.is_empty() {
+            thinned
+                .all
+                .iter()
+                .for_each(|cell| fine.smooth[*cell] = false);
+        }
         let is_missed = |cell: &usize| {
             corners_of(grid, *cell)
                 .iter()
@@ -136,7 +150,9 @@ pub fn areas_m2(
         all.extend(left.map(|cell| (cell, surface.missed_whole(cell))));
         for (cell, samples) in all {
             fine.smooth[cell] = samples.is_empty();
+            let [of_fine, of_coarse] = thinned.scales(cell);
             for (part, [area_m2, coarse_area_m2]) in samples {
+                let (area_m2, coarse_area_m2) = (of_fine * area_m2, of_coarse * coarse_area_m2);
                 fine.x_m.push(part.at_m[0]);
                 fine.y_m.push(part.at_m[1]);
                 fine.height_m.push(part.height_m);
@@ -329,14 +345,64 @@ fn corners_of(grid: &Grid, cell: usize) -> [usize; 4] {
     [first, first + 1, first + columns, first + columns + 1]
 }
 
-/// The cells in which the surface ends or departs from its corners, ascending: of too many those that
-/// depart most, and the others.
+/// The cells in which the surface ends or departs from its corners.
+struct Broken {
+    /// Those that are sampled, ascending.
+    cells: Vec<usize>,
+    /// Those in which it ends beyond [`MOST_CELLS`].
+    left: Vec<usize>,
+    /// Of those with surface at all corners, too many to be sampled.
+    thinned: Thinned,
+}
+
+/// Cells of which some stand for all. How far a cell departs has no part in the choice: the errors of their corners
+/// are of either sign, and what is mended of one sign alone is worse than nothing.
+#[derive(Default)]
+struct Thinned {
+    /// Ascending; none where every cell is sampled.
+    all: Vec<usize>,
+    /// Those that are sampled, ascending.
+    chosen: Vec<usize>,
+}
+
+impl Thinned {
+    /// One at random out of each of `count` runs of the cells, since what breaks them may repeat.
+    fn new(all: Vec<usize>, count: usize) -> Self {
+        let mut random = Random::new(1);
+        let start = |run: usize| run * all.len() / count;
+        let chosen = (0..count).map(|run| {
+            let (from, to) = (start(run), start(run + 1));
+            let place = (random.between(0.0, 1.0) * (to - from) as f64) as usize;
+            all[from + place.min(to - from - 1)]
+        });
+        Self {
+            chosen: chosen.collect(),
+            all,
+        }
+    }
+
+    /// The cells of each kind that a sampled one stands for, in both rules: the coarser has every second alone.
+    fn scales(&self, cell: usize) -> [f64; 2] {
+        let Ok(rank) = self.chosen.binary_search(&cell) else {
+            return [1.0; 2];
+        };
+        let [all, chosen, second] = [
+            self.all.len(),
+            self.chosen.len(),
+            self.chosen.len().div_ceil(2),
+        ]
+        .map(|n| n as f64);
+        let of_coarse = if rank % 2 == 0 { all / second } else { 0.0 };
+        [all / chosen, of_coarse]
+    }
+}
+
 fn broken_cells(
     grid: &Grid,
     heights_m: &[Option<f64>],
     surface: Over,
     progress: &dyn Progress,
-) -> Result<(Vec<usize>, Vec<usize>), Interrupted> {
+) -> Result<Broken, Interrupted> {
     let [columns, rows] = [grid.x_m.samples, grid.y_m.samples];
     let across = columns.saturating_sub(1);
     let departs = |cell: usize| {
@@ -356,7 +422,7 @@ fn broken_cells(
         }
     };
     let cells = 0..across * rows.saturating_sub(1);
-    let mut broken: Vec<(usize, f64)> = cells
+    let broken: Vec<(usize, f64)> = cells
         .into_par_iter()
         .with_min_len(fluxform_base::progress::items_a_task(across * rows))
         .map(|cell| {
@@ -368,14 +434,29 @@ fn broken_cells(
         })
         .filter(|found| !found.as_ref().is_ok_and(|(_, by)| *by <= SMOOTH))
         .collect::<Result<_, Interrupted>>()?;
-    let mut beyond = Vec::new();
-    if broken.len() > MOST_CELLS {
-        broken.sort_by(|(a, by_a), (b, by_b)| by_b.total_cmp(by_a).then(a.cmp(b)));
-        beyond = broken.split_off(MOST_CELLS);
-        broken.sort_by_key(|(cell, _)| *cell);
+    let (ends, departs): (Vec<_>, Vec<_>) =
+        broken.into_iter().partition(|(_, by)| by.is_infinite());
+    let [mut cells, departs] = [ends, departs].map(|found| {
+        found
+            .into_iter()
+            .map(|(cell, _)| cell)
+            .collect::<Vec<usize>>()
+    });
+    let left = cells.split_off(cells.len().min(MOST_CELLS));
+    let room = MOST_CELLS - cells.len();
+    let mut thinned = Thinned::default();
+    if departs.len() <= room {
+        cells.extend(departs);
+    } else if room >= FEWEST_CHOSEN {
+        thinned = Thinned::new(departs, room);
+        cells.extend(&thinned.chosen);
     }
-    let cells = |found: Vec<(usize, f64)>| found.into_iter().map(|(cell, _)| cell).collect();
-    Ok((cells(broken), cells(beyond)))
+    cells.sort_unstable();
+    Ok(Broken {
+        cells,
+        left,
+        thinned,
+    })
 }
 
 /// The covered part of a line that each end with surface gets.
@@ -524,6 +605,45 @@ mod tests {
         };
         let [a, b, c] = [21, 81, 321].map(error);
         assert!(a < 8e-3 && b < a / 8.0 && c < b / 8.0, "{a} {b} {c}");
+    }
+
+    /// Of too many cells those were sampled that depart most from the mean of their corners, relative to it: those
+    /// whose corners are low.
+    #[test]
+    fn cells_that_stand_for_others_are_not_chosen_by_their_departure() {
+        let ribs = |p: [f64; 2]| {
+            let phase = (0.97 * p[0] + 0.24 * p[1]) / 0.0025;
+            Some(if phase.rem_euclid(1.0) < 0.5 {
+                0.02
+            } else {
+                0.04
+            })
+        };
+        for n in [193, 301] {
+            let grid = grid([n, n]);
+            let (areas, fine) = both(&grid, ribs);
+            let broken = fine.smooth.iter().filter(|smooth| !**smooth).count();
+            assert!(broken > MOST_CELLS, "{broken}");
+            let columns = grid.x_m.samples;
+            let of_points = |weights: &[f64]| -> f64 {
+                let height =
+                    |k: usize| ribs([grid.x_m.node(k % columns), grid.y_m.node(k / columns)]);
+                weights
+                    .iter()
+                    .enumerate()
+                    .map(|(k, area)| area * height(k).unwrap())
+                    .sum()
+            };
+            let total: f64 = areas.iter().sum();
+            let smooth: f64 = fine.point_area_m2.iter().sum();
+            for rule in [&fine.area_m2, &fine.coarse_area_m2] {
+                let sum: f64 = rule.iter().sum();
+                assert!(((smooth + sum) / total - 1.0).abs() < 1e-9);
+                let of_samples: f64 = rule.iter().zip(&fine.height_m).map(|(a, h)| a * h).sum();
+                let mean = (of_points(&fine.point_area_m2) + of_samples) / total;
+                assert!((mean / 0.03 - 1.0).abs() < 8e-3, "{n}: {mean}");
+            }
+        }
     }
 
     /// A cap on a plate that ends: samples and smooth cells together have the area of all points, and

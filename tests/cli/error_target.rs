@@ -252,3 +252,28 @@ fn points_that_nobody_gives_hold_the_default_error() {
     assert_eq!(manifest["made_with"]["default_error"], 0.01);
     place.run(&["verify", "results/seed_air/wedge"]).ends(0);
 }
+
+/// Two samples along an axis leave nothing to compare: that was stated as no error at all.
+#[test]
+fn points_that_leave_nothing_to_compare_hold_no_error() {
+    let place = Place::new();
+    let of = |grid: [usize; 2]| {
+        let [x, y] = grid;
+        let text = format!(
+            "primitive = \"wedge\"\nlow_mm = 34.0\n[points]\nx_mm = [-30, 30, {x}]\ny_mm = [-30, 30, {y}]\n"
+        );
+        let file = shape(&place, "wedge", &text);
+        let args = ["lambda", "designs/seed_air.toml", &file, "--format", "json"];
+        place.run(&args).ends(0).json()
+    };
+    let lambda = |file: &Value| file["lambda_n_per_m"].as_f64().unwrap();
+    let fine = lambda(&of([61, 61]));
+    for grid in [[2, 2], [2, 61], [61, 2]] {
+        let file = of(grid);
+        let stated = file["headline"]["force_error"].as_f64().unwrap();
+        assert!(
+            stated > (lambda(&file) / fine - 1.0).abs(),
+            "{grid:?}: {file}"
+        );
+    }
+}

@@ -11,7 +11,7 @@ use fluxform::numerics::axis::Axis;
 use fluxform::numerics::random::Random;
 use fluxform::progress::Silent;
 use fluxform::shape::height::Grid;
-use fluxform::shape::point_areas::{FineCells, Over, areas_m2};
+use fluxform::shape::point_areas::{FineCells, Over, SMOOTH, areas_m2};
 
 /// Finer along each axis for the limit.
 const FINER: usize = 8;
@@ -261,6 +261,7 @@ fn claimed_and_true(kind: Kind, counts: Counts, n: &mut Random) -> [f64; 2] {
         rows: points.samples,
         index: &points.index,
         smooth: &points.fine.smooth,
+        smooth_within: SMOOTH,
     };
     let fine = (!points.fine.smooth.is_empty()).then_some(FineSamples {
         are_points: counts == Counts::Graded,
@@ -273,7 +274,7 @@ fn claimed_and_true(kind: Kind, counts: Counts, n: &mut Random) -> [f64; 2] {
     });
     let places = Some(places);
     let stated = limit_error(&problem, lambda, &points.areas, places, fine, &settings);
-    let stated = stated.unwrap().expect("an estimate");
+    let stated = stated.unwrap();
     let fine = sampled(&object, &array, FINER * (samples - 1) + 1);
     let limit = chosen(&fine.with_samples().problem(&limits, true), &settings);
     [stated, (lambda / limit - 1.0).abs()]

@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::passive;
 use crate::scene::steel::Solved;
-use crate::shape::point_areas::FineCells;
+use crate::shape::point_areas::{FineCells, SMOOTH};
 
 /// Places, what is requested there, and what is known of their error.
 #[derive(Debug, Clone)]
@@ -199,7 +199,7 @@ impl ForcePoints {
     }
 
     /// How far the constant of these points is from the limit of ever more of them, relative; `None`
-    /// for graded points, whose patches are compared with wider ones instead, and for too few. `unwired`
+    /// for graded points, whose patches are compared with wider ones instead. `unwired`
     /// is `problem` before `wiring`.
     ///
     /// # Errors
@@ -220,13 +220,14 @@ impl ForcePoints {
             rows: grid.rows,
             index: &grid.index,
             smooth: cells.map_or(&[], |fine| &fine.smooth),
+            smooth_within: SMOOTH,
         });
         if let (Some(cells), Some(on_grid)) = (cells, self.before_graded()) {
             let (of_grid, graded) = problem.split_at(on_grid);
             let fine = Some(fine_samples(cells, &graded, true));
             let areas = &self.areas[..on_grid];
             let found = limit_error(&of_grid, lambda_n_per_m, areas, grid, fine, settings);
-            return Ok(found?);
+            return Ok(Some(found?));
         }
         let places_m = cells.map_or_else(Vec::new, |fine| {
             self.sample_places_m(fine, &at.scene.design.workspace)
@@ -253,14 +254,9 @@ impl ForcePoints {
             .map(|(plain, re)| re.problem(plain));
         let fine = cells.zip(wired.as_ref());
         let fine = fine.map(|(cells, wired)| fine_samples(cells, wired, false));
-        Ok(limit_error(
-            problem,
-            lambda_n_per_m,
-            &self.areas,
-            grid,
-            fine,
-            settings,
-        )?)
+        let areas = &self.areas;
+        let found = limit_error(problem, lambda_n_per_m, areas, grid, fine, settings);
+        Ok(Some(found?))
     }
 
     /// Where the magnet is at samples: no lower than the workspace, or the lowest point below it.

@@ -100,6 +100,8 @@ pub struct Cells {
 pub struct Faces {
     list: Vec<piece::Face>,
     hair: Hair,
+    /// Width in plan up to which a wall is left out, m.
+    wall_m: f64,
     effort: Arc<Looks>,
 }
 
@@ -209,13 +211,18 @@ impl Faces {
                 plan_m: HAIR * plan_m,
                 height_m: HAIR * height_m,
             },
+            wall_m: reach,
             effort,
         }
     }
 
+    /// Walls are no faces, so what they leave open is not seen through.
     fn look(&self) -> Look<'_> {
         Look {
-            hair: self.hair,
+            hair: Hair {
+                plan_m: self.hair.plan_m.max(self.wall_m),
+                ..self.hair
+            },
             effort: &self.effort,
         }
     }

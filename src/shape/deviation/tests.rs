@@ -218,3 +218,43 @@ fn a_thick_sheet_hides_its_underside() {
         assert!(most_m < 1e-3, "{samples}: {worst:?}");
     }
 }
+
+/// A wall that the file's rounding makes lean left its underside open to view.
+#[test]
+fn nothing_is_seen_through_a_wall_that_leans_by_the_files_rounding() {
+    let rounding = 4e-9;
+    let square = |x: [f64; 2], z: f64| {
+        let at = |x, y| [x, y, z];
+        let [a, b, c, d] = [
+            at(x[0], -0.05),
+            at(x[1], -0.05),
+            at(x[1], 0.05),
+            at(x[0], 0.05),
+        ];
+        [[a, b, c], [a, c, d]]
+    };
+    let step = 0.0004;
+    let [low, high] = [step - 3e-9, step + 2e-9];
+    let wall = |y| [[low, y, 0.02], [high, y, 0.022]];
+    let ([a, b], [c, d]) = (wall(-0.05), wall(0.05));
+    let triangles = [
+        square([-0.05, low], 0.02),
+        square([high, 0.05], 0.022),
+        square([-0.05, 0.05], 0.0),
+        [[a, c, b], [b, c, d]],
+    ];
+    let file = FileMesh {
+        triangles: triangles.concat(),
+        coordinate_rounding: rounding,
+        ..FileMesh::default()
+    };
+    let mesh = Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap();
+    let grid = grid([31, 41]);
+    let known = heights(&mesh, &grid, &Silent).unwrap();
+    let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
+    let faces = Faces::new(&mesh, &grid, Looks::endless());
+    let lattice = Lattice::new(&faces, &grid, &known);
+    let worst = vertical(&mesh, &grid, &lattice, &Silent).unwrap();
+    let most_m = worst.above.value_m.max(worst.below.value_m);
+    assert!((1e-3..2e-3).contains(&most_m), "{worst:?}");
+}

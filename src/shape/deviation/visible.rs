@@ -31,7 +31,8 @@ pub(super) fn supremum_over_visible(
     value: &impl Fn(Point) -> f64,
 ) -> Option<Extreme> {
     let Look { hair, effort } = look;
-    if effort.spend(CUTS * others.len()) {
+    // What hides so narrow a piece is not distinguished.
+    if piece.width() <= hair.plan_m || effort.spend(CUTS * others.len()) {
         return None;
     }
     if others.len() > HIGHEST
