@@ -10,13 +10,14 @@
 //! four ways, are a rule of twice the spacing. The error falls with the second power of the spacing,
 //! those rules are off four times as far, so they differ from all points by three times the error of
 //! these, in the share of the area that is in blocks. The largest difference, with a margin, is the
-//! estimate.
+//! estimate. The least force over all places is no mean: for it every second point along both axes is taken.
 //!
 //! Points that count alike give another limit than the object's, off by the first power of the
 //! spacing: their border counts twice. The difference from the same points by area is in the first one.
 
 use rayon::prelude::*;
 
+use super::Criterion;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::solve::constant;
 
@@ -118,10 +119,16 @@ pub fn limit_error(
         Ok(apart(rows.constant(problem, &settings)?))
     };
     let of_cells = apart(by_points);
+    let subsets: Vec<usize> = (0..SUBSETS).collect();
     let of_spacing = match places {
+        // The least over places: the one that decides may be a sample, or a corner of every block.
+        Some(places) if settings.criterion == Criterion::Maxmin => largest(&subsets, |&which| {
+            let samples = fine.map(|fine| one_of(2, fine.areas, which % 2));
+            differs(&places.every_second(areas, which), samples.as_deref())
+        })?,
         Some(places) => spacing_off(places, areas, (of_cells, fine), differs)?,
-        None => largest(&[0, 1, 2, 3], |&which| {
-            differs(&every_fourth(areas, which), None)
+        None => largest(&subsets, |&which| {
+            differs(&one_of(SUBSETS, areas, which), None)
         })?,
     };
     let of_samples = match fine {
@@ -173,8 +180,9 @@ fn largest<T: Sync>(
     (found.into_iter()).try_fold(0.0_f64, |most, off| Ok(most.max(off?)))
 }
 
-fn every_fourth(areas: &[f64], which: usize) -> Vec<f64> {
-    let weight = |(point, area): (usize, &f64)| match point % SUBSETS == which {
+/// The weights of the `which`-th of every `count` points.
+fn one_of(count: usize, areas: &[f64], which: usize) -> Vec<f64> {
+    let weight = |(point, area): (usize, &f64)| match point % count == which {
         true => *area,
         false => 0.0,
     };
@@ -182,6 +190,23 @@ fn every_fourth(areas: &[f64], which: usize) -> Vec<f64> {
 }
 
 impl GridPlaces<'_> {
+    /// The weights of every second point along both axes, in the `which`-th of four ways. Counted from the nearer
+    /// end, so that no way has the mirror image of what it leaves out.
+    fn every_second(&self, areas: &[f64], which: usize) -> Vec<f64> {
+        let first = [which % 2, which / 2];
+        let weight = |(&place, &area): (&usize, &f64)| {
+            let at = [place % self.columns, place / self.columns];
+            let taken = |axis: usize, samples: usize| {
+                samples == 1 || at[axis].min(samples - 1 - at[axis]) % 2 == first[axis]
+            };
+            match taken(0, self.columns) && taken(1, self.rows) {
+                true => area,
+                false => 0.0,
+            }
+        };
+        self.index.iter().zip(areas).map(weight).collect()
+    }
+
     /// The weights of the points where every block of two by two smooth cells counts by its corners alone, blocks
     /// laid in the `which`-th of four ways, and the share of all weight that is in blocks. Of one row or column
     /// two intervals are a block.

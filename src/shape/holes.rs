@@ -227,7 +227,7 @@ mod tests {
             let ring = (7.0..12.0).contains(&away);
             let rectangle = (60..90).contains(&column) && (5..8).contains(&row)
                 || column == 70 && (20..35).contains(&row);
-            (!(ring || with_rectangles && rectangle)).then(|| Sample {
+            (!(ring || with_rectangles && rectangle)).then_some(Sample {
                 height_m: 0.03 + 4.0 * (x * x - y * y) + 3.0 * x * y + 0.2 * x,
                 normal: [0.0, 0.0, 1.0],
             })

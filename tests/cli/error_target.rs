@@ -277,3 +277,49 @@ fn points_that_leave_nothing_to_compare_hold_no_error() {
         );
     }
 }
+
+/// The points that decide the least over places were among those of every comparison: no error was stated.
+#[test]
+fn the_error_of_a_least_over_places_is_not_that_of_a_mean() {
+    let place = Place::new();
+    place.write("design.toml", ARRAY);
+    let of = |[x, y]: [usize; 2]| {
+        let text = format!(
+            "primitive = \"half-sphere\"\nradius_mm = 24.97\nbase_mm = 35.1\n\
+             [points]\nweights = \"area\"\nx_mm = [-45, 45, {x}]\ny_mm = [-45, 45, {y}]\n"
+        );
+        let file = shape(&place, "dome", &text);
+        let options = ["--criterion", "maxmin", "--format", "json"];
+        let args = ["lambda", "design.toml", &file];
+        place.run(&[&args[..], &options].concat()).ends(0).json()
+    };
+    let fine = number(&of([121, 121])["lambda_n_per_m"]);
+    for samples in [[16, 28], [25, 17]] {
+        let file = of(samples);
+        let off = (number(&file["lambda_n_per_m"]) / fine - 1.0).abs();
+        let stated = number(&file["headline"]["force_error"]);
+        assert!(off < stated && stated < 0.05, "{samples:?}: {off} {stated}");
+    }
+}
+
+/// Sixteen coils out of their places, each with its own largest current.
+const ARRAY: &str = "name = \"array\"
+[coil]
+inner_diameter_mm = 10
+outer_diameter_mm = 24
+length_mm = 30
+[wire]
+diameter_mm = 0.5
+[array]
+positions_mm = [
+    [-49.4, -52.6], [-18.0, -50.5], [20.0, -52.2], [50.8, -50.2],
+    [-49.9, -18.7], [-16.4, -16.7], [18.0, -19.3], [48.8, -14.1],
+    [-49.1, 19.0], [-14.4, 19.8], [16.4, 18.5], [51.8, 17.4],
+    [-49.9, 49.9], [-14.8, 50.4], [14.9, 48.1], [51.8, 49.4],
+]
+[supply]
+current_max_a = [
+    2.881, 0.827, 1.154, 2.957, 1.704, 2.789, 2.41, 0.621, 0.883, 1.345, 2.679, 1.202, 1.55, 1.598, 1.177, 2.424,
+]
+current_min_a = -0.5
+";
