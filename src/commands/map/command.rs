@@ -44,7 +44,7 @@ use crate::scene::cost;
      "for ParaView, less accurate"),
     ("fluxform map designs/seed_air.toml --out drawn --components force --plot drawn/force.svg",
      "drawn: slices of the force, and the force over height"),
-    ("fluxform map designs/seed_air.toml --out maps_mm --vfield maps_mm/nodes.yaml --mpem maps_mm/mpem.yaml",
+    ("fluxform map designs/seed_air.toml --out manip --vfield manip/nodes.yaml --mpem manip/mpem.yaml",
      "for mag_manip"),
     ("fluxform tabulate designs/seed.toml --out maps --format json --force",
      "replace what is there, with a summary for programs"),
