@@ -48,21 +48,21 @@ fn cone(count: usize) -> Mesh {
     placed(facets.collect())
 }
 
-fn looks_of(mesh: &Mesh) -> (Vertical, i64) {
-    let grid = grid([31, 41]);
-    let known = heights(mesh, &grid, &Silent).unwrap();
+/// The largest differences over the cells, and the looks that they took.
+fn looks_of(mesh: &Mesh, grid: &Grid) -> (Vertical, i64) {
+    let known = heights(mesh, grid, &Silent).unwrap();
     let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
     let effort = Looks::endless();
-    let faces = Faces::new(mesh, &grid, Arc::clone(&effort));
-    let lattice = Lattice::new(&faces, &grid, &known);
-    let worst = vertical(mesh, &grid, &lattice, &Silent).unwrap();
+    let faces = Faces::new(mesh, grid, Arc::clone(&effort));
+    let lattice = Lattice::new(&faces, grid, &known);
+    let worst = vertical(mesh, grid, &lattice, &Silent).unwrap();
     (worst, i64::MAX - effort.left.load(Ordering::Relaxed))
 }
 
 /// The cell under the apex was quartered until no two slivers were left together.
 #[test]
 fn the_work_of_a_fan_grows_no_faster_than_its_facets() {
-    let [few, many] = [500, 8000].map(|count| looks_of(&cone(count)));
+    let [few, many] = [500, 8000].map(|count| looks_of(&cone(count), &grid([31, 41])));
     assert!(many.1 < 20 * few.1, "{} {}", few.1, many.1);
     // The floor is hidden, and the finer cone is the rounder.
     let [few, many] = [few.0, many.0].map(|worst| (worst.above.value_m, worst.below.value_m));
@@ -209,11 +209,7 @@ fn a_thick_sheet_hides_its_underside() {
             x_m: axis,
             y_m: axis,
         };
-        let known = heights(&mesh, &grid, &Silent).unwrap();
-        let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
-        let faces = Faces::new(&mesh, &grid, Looks::endless());
-        let lattice = Lattice::new(&faces, &grid, &known);
-        let worst = vertical(&mesh, &grid, &lattice, &Silent).unwrap();
+        let (worst, _) = looks_of(&mesh, &grid);
         let most_m = worst.above.value_m.max(worst.below.value_m);
         assert!(most_m < 1e-3, "{samples}: {worst:?}");
     }
@@ -249,12 +245,7 @@ fn nothing_is_seen_through_a_wall_that_leans_by_the_files_rounding() {
         ..FileMesh::default()
     };
     let mesh = Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap();
-    let grid = grid([31, 41]);
-    let known = heights(&mesh, &grid, &Silent).unwrap();
-    let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
-    let faces = Faces::new(&mesh, &grid, Looks::endless());
-    let lattice = Lattice::new(&faces, &grid, &known);
-    let worst = vertical(&mesh, &grid, &lattice, &Silent).unwrap();
+    let (worst, _) = looks_of(&mesh, &grid([31, 41]));
     let most_m = worst.above.value_m.max(worst.below.value_m);
     assert!((1e-3..2e-3).contains(&most_m), "{worst:?}");
 }
