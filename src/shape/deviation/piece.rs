@@ -514,6 +514,32 @@ mod tests {
     }
 
     #[test]
+    fn a_segment_is_cut_where_it_crosses_rectangle_and_triangle() {
+        let square = Rect {
+            low_m: [0.0; 2],
+            high_m: [1.0; 2],
+        };
+        let face = Face::new(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).unwrap();
+        let of = |a: Point, b: Point| Segment {
+            ends_m: [a, b],
+            part: [0.0, 1.0],
+        };
+        let close = |found: Option<Segment>, expected: [f64; 2]| {
+            let found = found.unwrap().part;
+            assert!(
+                (0..2).all(|k| (found[k] - expected[k]).abs() < 1e-15),
+                "{found:?}"
+            );
+        };
+        let across = of([-0.7, 0.3], [1.3, 0.3]);
+        close(square.along(across), [0.35, 0.85]);
+        close(face.along(across), [0.35, 0.7]);
+        close(square.along(of([0.2, 0.7], [0.4, 1.3])), [0.0, 0.5]);
+        let beside = of([-0.7, 1.3], [1.3, 1.3]);
+        assert!(square.along(beside).is_none() && face.along(beside).is_none());
+    }
+
+    #[test]
     fn a_parabola_is_largest_at_its_vertex_on_any_part() {
         let (a, b) = ([0.7, 0.2], [1.9, 1.1]);
         // Vertex at 0.37 of the whole segment.
