@@ -203,6 +203,8 @@ pub struct FeltForce {
     pub not_modelled: Vec<String>,
 }
 
+/// What is left out where the unpowered steel's upward pull counts.
+pub const SIDEWAYS_PULL: &str = "sideways pull of the unpowered steel";
 /// Effects that no part of the felt error covers.
 const NOT_MODELLED: [&str; 6] = [
     "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",
@@ -214,9 +216,10 @@ const NOT_MODELLED: [&str; 6] = [
 ];
 
 impl FeltForce {
-    /// Of currents whose errors without any uncertainty are given, and with those of `study`.
+    /// Of currents whose errors without any uncertainty are given, and with those of `study`. `pull_share` is that of
+    /// the unpowered steel's sideways pull, where its upward one counts.
     #[must_use]
-    pub fn new(exact: FeltShares, study: Option<&Study>) -> Self {
+    pub fn new(exact: FeltShares, study: Option<&Study>, pull_share: Option<f64>) -> Self {
         let promised = |study: &Study| FeltShares {
             fixed: study.fixed.promised.expected,
             feedback: study.feedback.promised.expected,
@@ -237,12 +240,16 @@ impl FeltForce {
         let missing: Vec<&str> = missing.map(|cause| cause.words()).collect();
         let not_given = (!missing.is_empty())
             .then(|| format!("{}: no bound is given ([uncertainty])", missing.join(", ")));
+        let pull = pull_share.map(|share| {
+            let percent = share * 100.0;
+            format!("{SIDEWAYS_PULL}: {percent:.1} % of the requested force, root mean square")
+        });
         let expected = study.map_or(exact, promised);
         Self {
             total: expected,
             expected,
             parts: std::iter::once(own).chain(parts).collect(),
-            not_modelled: (not_given.into_iter())
+            not_modelled: (pull.into_iter().chain(not_given))
                 .chain(NOT_MODELLED.map(str::to_owned))
                 .collect(),
         }

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::allocation::{Allocator, AllocatorError};
-use super::problem::ForceProblem;
+use super::feedback::{Reachable, reachable};
+use super::problem::{ForceProblem, ProblemError};
 
 /// Ratios are looked at where at least this share of the largest force is requested: towards none
 /// they say nothing.
@@ -22,9 +22,6 @@ pub struct GivenForce {
     /// Whether lambda exceeds `lambda_saturation`, above which the currents grow no more.
     pub above_saturation: bool,
 }
-
-/// Points of feedback at most: means and ranges of a force that changes over centimetres.
-const MOST_POINTS: usize = 1000;
 
 /// Sums of forces and their ratios over the points.
 struct Ratios {
@@ -100,31 +97,21 @@ impl GivenForce {
         ratios.of_force(lambda_saturation_n_per_m.is_some_and(above))
     }
 
-    /// With currents of least power of their own at every point (at a thousand of many); `None` where
-    /// no force is requested.
+    /// With currents of their own at every point: the requested force, or the nearest within reach. `None` where no
+    /// force is requested.
     ///
     /// # Errors
-    /// Limits or resistances out of their domain.
+    /// Where the problem is malformed.
     pub fn with_feedback(
         problem: &ForceProblem,
         lambda_n_per_m: f64,
-    ) -> Result<Option<Self>, AllocatorError> {
-        let mut allocator = Allocator::new(
-            problem.resistance_ohm,
-            problem.lower_a,
-            problem.upper_a,
-            problem.total_max_a,
-        )?;
-        let coils = problem.coils();
-        let mut currents_a = vec![0.0; coils];
+    ) -> Result<Option<Self>, ProblemError> {
+        let Reachable { least_n, most_n } = reachable(problem)?;
         let mut ratios = Ratios::new(problem);
-        let every = problem.points().div_ceil(MOST_POINTS).max(1);
-        for point in (0..problem.points()).step_by(every) {
-            let offset_n = problem.offset_n.map_or(0.0, |offset| offset[point]);
-            let request_n = lambda_n_per_m * problem.height_m[point];
-            let row = &problem.forces_n_per_a[point * coils..(point + 1) * coils];
-            let found = allocator.allocate(row, request_n - offset_n, &mut currents_a);
-            ratios.add(problem, point, found.force_n + offset_n, request_n);
+        for (point, height_m) in problem.height_m.iter().enumerate() {
+            let request_n = lambda_n_per_m * height_m;
+            let force_n = request_n.max(least_n[point]).min(most_n[point]);
+            ratios.add(problem, point, force_n, request_n);
         }
         Ok(ratios.of_force(false))
     }

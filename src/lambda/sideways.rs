@@ -8,12 +8,12 @@ use super::feedback::FeedbackError;
 use super::problem::{ForceProblem, Settings};
 use super::vector_allocation::VectorAllocator;
 
-/// The force along x and y at the chosen lambda, by that of the coils; the pull of unpowered steel
-/// counts upward only. Shares are root mean squares over the points, over that of the requested
+/// The force along x and y at the chosen lambda, by that of the coils; the pull of the unpowered steel
+/// counts upward only, and `pull_share` says what that leaves out. Shares are root mean squares over the points, over that of the requested
 /// push; angles are between the given force and upward, medians over the points above height 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sideways {
-    /// Points looked at, evenly among all.
+    /// Points looked at, evenly among all; with feedback up to a thousand of them.
     pub points: usize,
     /// Share with the static currents.
     pub static_share: f64,
@@ -30,28 +30,86 @@ pub struct Sideways {
     /// Mean power of that over the power of feedback of the upward force alone; where it is out of
     /// reach both give the nearest force.
     pub vector_power_ratio: f64,
+    /// Share of the unpowered steel's own sideways pull, which neither the shares above nor feedback
+    /// count; absent where its upward pull is not counted either.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pull_share: Option<f64>,
 }
 
 /// Out of reach a sideways error counts as this share of a vertical one: vertical first.
 pub const SIDEWAYS_WEIGHT: f64 = 0.1;
 
+/// One point: its forces per ampere along x, y and z, the force without currents, the request and the weight.
+struct Point<'a> {
+    axes: [&'a [f64]; 3],
+    offset_n: f64,
+    request_n: f64,
+    weight: f64,
+}
+
+impl<'a> Point<'a> {
+    fn of(
+        problem: &ForceProblem<'a>,
+        [along_x, along_y]: [&'a [f64]; 2],
+        lambda_n_per_m: f64,
+        point: usize,
+    ) -> Self {
+        let at = point * problem.coils()..(point + 1) * problem.coils();
+        let axes = [along_x, along_y, problem.forces_n_per_a];
+        Self {
+            axes: axes.map(|axis| &axis[at.clone()]),
+            offset_n: problem.offset_n.map_or(0.0, |offset| offset[point]),
+            request_n: lambda_n_per_m * problem.height_m[point],
+            weight: problem.weights.map_or(1.0, |all| all[point]),
+        }
+    }
+
+    fn fill(&self, rows: &mut [[f64; 3]]) {
+        for (coil, row) in rows.iter_mut().enumerate() {
+            *row = self.axes.map(|axis| axis[coil]);
+        }
+    }
+}
+
 /// One way of choosing currents.
 #[derive(Default)]
 struct Given {
     square: f64,
+    requested_square: f64,
     angles_deg: Vec<f64>,
+    weights: f64,
     reached: f64,
     power: f64,
 }
 
 impl Given {
-    fn add(&mut self, force_n: [f64; 3], requested_n: f64, weight: f64) {
+    fn add(&mut self, at: &Point, rows: &[[f64; 3]], currents: &[f64]) {
+        let mut force_n = [0.0, 0.0, at.offset_n];
+        for (row, i) in rows.iter().zip(currents) {
+            for (sum, part) in force_n.iter_mut().zip(row) {
+                *sum += part * i;
+            }
+        }
         let sideways = force_n[0].hypot(force_n[1]);
-        self.square += weight * sideways * sideways;
-        if requested_n > 0.0 {
+        self.square += at.weight * sideways * sideways;
+        self.requested_square += at.weight * at.request_n * at.request_n;
+        if at.request_n > 0.0 {
             self.angles_deg
                 .push(sideways.atan2(force_n[2]).to_degrees());
         }
+    }
+
+    fn count(&mut self, at: &Point, reach: Reach, (currents, ohm): (&[f64], &[f64])) {
+        let heat = currents.iter().zip(ohm).map(|(i, ohm)| ohm * i * i);
+        self.power += at.weight * heat.sum::<f64>();
+        self.weights += at.weight;
+        if reach == Reach::Reached {
+            self.reached += at.weight;
+        }
+    }
+
+    fn share(&self) -> f64 {
+        (self.square / self.requested_square).sqrt()
     }
 
     fn median_deg(&mut self) -> f64 {
@@ -67,19 +125,20 @@ impl Given {
 }
 
 /// The sideways force of `problem`, whose forces per ampere along x and y are `side_n_per_a`, each
-/// [point, coil], at `lambda_n_per_m` with static currents and with feedback. `None` where no force is
-/// requested.
+/// [point, coil], at `lambda_n_per_m` with static currents, and at the points `followed` with feedback. `None` where no
+/// force is requested.
 ///
 /// # Errors
 /// Where the problem is malformed.
 ///
 /// # Panics
-/// When `side_n_per_a` or the currents are shorter than the problem.
+/// When `side_n_per_a` or the currents are shorter than the problem, and for a point that it does not have.
 pub fn sideways(
     problem: &ForceProblem,
     side_n_per_a: [&[f64]; 2],
     lambda_n_per_m: f64,
     static_currents_a: &[f64],
+    followed: &[usize],
 ) -> Result<Option<Sideways>, FeedbackError> {
     problem.validate(&Settings::default())?;
     let (ohm, lower, upper) = (problem.resistance_ohm, problem.lower_a, problem.upper_a);
@@ -87,61 +146,37 @@ pub fn sideways(
     let mut upward = Allocator::new(ohm, lower, upper, total)?;
     let mut vector = VectorAllocator::new(ohm, lower, upper, total, SIDEWAYS_WEIGHT)?;
     let coils = problem.coils();
-    let heaviest = problem.heaviest();
     let mut currents = vec![0.0; coils];
     let mut rows = vec![[0.0; 3]; coils];
     let [mut fixed, mut of_upward, mut of_vector]: [Given; 3] = Default::default();
-    let (mut weights, mut requested_square) = (0.0, 0.0);
-    for (point, height) in problem.height_m.iter().enumerate() {
-        let at = point * coils..(point + 1) * coils;
-        let of_z = &problem.forces_n_per_a[at.clone()];
-        for (i, row) in rows.iter_mut().enumerate() {
-            *row = [
-                side_n_per_a[0][at.start + i],
-                side_n_per_a[1][at.start + i],
-                of_z[i],
-            ];
-        }
-        let offset = problem.offset_n.map_or(0.0, |offset| offset[point]);
-        let weight = problem.weights.map_or(1.0, |all| all[point] / heaviest);
-        let requested = lambda_n_per_m * height;
-        weights += weight;
-        requested_square += weight * requested * requested;
-        let force = |currents: &[f64]| {
-            let mut force = [0.0, 0.0, offset];
-            for (row, i) in rows.iter().zip(currents) {
-                for (sum, part) in force.iter_mut().zip(row) {
-                    *sum += part * i;
-                }
-            }
-            force
-        };
-        let power = |currents: &[f64]| -> f64 {
-            let heat = currents.iter().zip(ohm).map(|(i, ohm)| ohm * i * i);
-            weight * heat.sum::<f64>()
-        };
-        let share = |reach| if reach == Reach::Reached { weight } else { 0.0 };
-        fixed.add(force(static_currents_a), requested, weight);
-        let found = upward.allocate(of_z, requested - offset, &mut currents);
-        of_upward.add(force(&currents), requested, weight);
-        of_upward.reached += share(found.reach);
-        of_upward.power += power(&currents);
-        let found = vector.allocate(&rows, [0.0, 0.0, requested - offset], &mut currents);
-        of_vector.reached += share(found.reach);
-        of_vector.power += power(&currents);
+    for point in 0..problem.points() {
+        let at = Point::of(problem, side_n_per_a, lambda_n_per_m, point);
+        at.fill(&mut rows);
+        fixed.add(&at, &rows, static_currents_a);
     }
-    if requested_square <= 0.0 {
+    for point in followed {
+        fluxform_base::progress::poll();
+        let at = Point::of(problem, side_n_per_a, lambda_n_per_m, *point);
+        at.fill(&mut rows);
+        let found = upward.allocate(at.axes[2], at.request_n - at.offset_n, &mut currents);
+        of_upward.add(&at, &rows, &currents);
+        of_upward.count(&at, found.reach, (&currents, ohm));
+        let request = [0.0, 0.0, at.request_n - at.offset_n];
+        let found = vector.allocate(&rows, request, &mut currents);
+        of_vector.count(&at, found.reach, (&currents, ohm));
+    }
+    if fixed.requested_square <= 0.0 {
         return Ok(None);
     }
-    let share = |given: &Given| (given.square / requested_square).sqrt();
     Ok(Some(Sideways {
-        points: problem.height_m.len(),
-        static_share: share(&fixed),
+        points: problem.points(),
+        static_share: fixed.share(),
         static_median_deg: fixed.median_deg(),
-        feedback_share: share(&of_upward),
+        feedback_share: of_upward.share(),
         feedback_median_deg: of_upward.median_deg(),
-        feedback_reached: of_upward.reached / weights,
-        vector_reached: of_vector.reached / weights,
+        feedback_reached: of_upward.reached / of_upward.weights,
+        vector_reached: of_vector.reached / of_vector.weights,
         vector_power_ratio: of_vector.power / of_upward.power,
+        pull_share: None,
     }))
 }

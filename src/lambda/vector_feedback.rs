@@ -275,6 +275,23 @@ pub fn render_vectors(
     lambda_n_per_m: f64,
     currents_of: CurrentsOf,
 ) -> Result<VectorRendering, FeedbackError> {
+    let all: Vec<usize> = (0..problem.upward.height_m.len()).collect();
+    render_vectors_at(problem, &all, lambda_n_per_m, currents_of)
+}
+
+/// [`render_vectors`] of some points.
+///
+/// # Errors
+/// Where the problem is malformed.
+///
+/// # Panics
+/// As [`render_vectors`], and for a point that the problem does not have.
+pub fn render_vectors_at(
+    problem: &VectorProblem,
+    points: &[usize],
+    lambda_n_per_m: f64,
+    currents_of: CurrentsOf,
+) -> Result<VectorRendering, FeedbackError> {
     let vector = problem.allocator(SIDEWAYS_WEIGHT)?;
     let limits = &problem.upward;
     let upward = Allocator::new(
@@ -283,7 +300,6 @@ pub fn render_vectors(
         limits.upper_a,
         limits.total_max_a,
     )?;
-    let points: Vec<usize> = (0..limits.height_m.len()).collect();
     let parts: Vec<Sums> = points
         .par_chunks(CHUNK_POINTS)
         .map(|points| {

@@ -34,5 +34,6 @@ pub mod ring_functions;
 pub mod small_quadratic;
 pub mod solid_angle;
 pub mod spectral;
+pub mod spread;
 pub mod streamlines;
 pub mod vec3;

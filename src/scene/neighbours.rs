@@ -79,7 +79,7 @@ fn iron_summary(
     let passive_force_n = iron_pull(scene)?.map(|(force_n, stage)| {
         warnings.extend(passive::warning(
             &stage,
-            passive::PASSIVE_TOLERANCE.max(scene.tolerances.forces),
+            passive::iron_tolerance(scene, passive::PASSIVE_TOLERANCE),
             force_n,
         ));
         accuracy.insert("iron_passive_force", stage);

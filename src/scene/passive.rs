@@ -98,7 +98,7 @@ pub(super) fn left_out_region(scene: &Scene, places_m: &[[f64; 3]]) -> Region {
 /// A magnet that touches the steel.
 pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, RunError> {
     if let Some(iron) = &scene.iron {
-        let tolerance = IRON_LEFT_OUT.max(scene.tolerances.forces);
+        let tolerance = iron_tolerance(scene, IRON_LEFT_OUT);
         let pull = scene.pulls.of(scene, iron, region, tolerance)?;
         return Ok(pull.map(Pull::Iron));
     }
@@ -131,6 +131,18 @@ pub fn pull(scene: &Scene, places_m: &[[f64; 3]], alone: bool) -> Result<Option<
     pull_to(scene, places_m, alone, PASSIVE_TOLERANCE)
 }
 
+/// The [`pull`] of all steel; `None` too where the design leaves it out.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn counted(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Option<Pull>, RunError> {
+    if scene.design.magnet.passive_force {
+        pull(scene, places_m, false)
+    } else {
+        Ok(None)
+    }
+}
+
 /// [`pull`] to another tolerance; of a plate and other bodies to that of the forces at best.
 ///
 /// # Errors
@@ -157,6 +169,11 @@ fn of_cores(pulled: &Pulled, tolerance: f64) -> Result<Pull, RunError> {
         .map_err(|fault| too_close(pulled.region, fault))
 }
 
+/// `tolerance` of the pull of a plate and other bodies: that of the forces at best.
+pub(super) fn iron_tolerance(scene: &Scene, tolerance: f64) -> f64 {
+    tolerance.max(scene.tolerances.forces)
+}
+
 /// Over the whole workspace, so that most places of a command share it.
 fn of_iron(
     scene: &Scene,
@@ -165,8 +182,9 @@ fn of_iron(
     tolerance: f64,
 ) -> Result<Option<Arc<TabulatedPull>>, RunError> {
     let region = left_out_region(scene, places_m);
-    let tolerance = tolerance.max(scene.tolerances.forces);
-    scene.pulls.of(scene, iron, region, tolerance)
+    scene
+        .pulls
+        .of(scene, iron, region, iron_tolerance(scene, tolerance))
 }
 
 /// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a

@@ -17,6 +17,7 @@ use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelFiel
 use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::field::winding::KERNEL_ERROR;
+use crate::numerics::spread::spread;
 
 /// Most points at which solutions of steel of any shape are compared.
 const IRON_SAMPLES: usize = 24;
@@ -135,8 +136,8 @@ impl Solved {
         let Some(array) = self.steel().iron() else {
             return Ok(None);
         };
-        let step = points_m.len().div_ceil(IRON_SAMPLES).max(1);
-        let some: Vec<_> = points_m.iter().copied().step_by(step).collect();
+        let some = spread(points_m.len(), IRON_SAMPLES).into_iter();
+        let some: Vec<_> = some.map(|point| points_m[point]).collect();
         Ok(array.difference_at(&some)?)
     }
 

@@ -1,11 +1,14 @@
 //! The sideways force against fields of `probe`, and of the seed's array against other solutions.
 
+use fluxform::bundle::headline::SIDEWAYS_PULL;
 use fluxform::commands::lambda::{LambdaOptions, run};
 use fluxform::commands::probe::{ProbeRequest, probe};
 use fluxform::design::{Design, Need};
 use fluxform::field::components::Components;
+use fluxform::numerics::spread::spread;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
+use fluxform::scene::passive::pull;
 use fluxform::shape::document::ShapeDocument;
 
 use super::{here, seed_air};
@@ -20,7 +23,7 @@ fn the_sideways_force_is_that_of_probed_gradients() {
     let options = LambdaOptions::default();
     let (points, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
     let points = &points.discretized.points;
-    let rows = || (0..points.height_m.len()).step_by(4);
+    let rows = || spread(points.height_m.len(), 4000).into_iter();
     let places = rows().map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
     let request = ProbeRequest {
         components: Components::Gradient,
@@ -89,4 +92,48 @@ fn the_seeds_array_pushes_sideways_as_computed_elsewhere() {
         within(found.vector_power_ratio, [power; 2], 0.02);
         assert_eq!(found.vector_reached, 1.0, "{name}: {found:?}");
     }
+}
+
+/// The upward pull of the unpowered steel was counted, and its sideways one passed over in silence.
+#[test]
+fn the_sideways_pull_of_the_steel_is_left_out_with_its_size() {
+    let path = here("designs/seed.toml");
+    let text = std::fs::read_to_string(&path).expect("the seed");
+    let text = text.replace("[magnet]", "[magnet]\npassive_force = true");
+    let (design, _) = Design::from_toml(&text, &path, Need::LAMBDA).expect("valid");
+    let shape = here("shapes/flat.toml");
+    let (document, _) = ShapeDocument::read(&shape).expect("valid");
+    let options = LambdaOptions::default();
+    let (points, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let points = &points.discretized.points;
+    let scene = Scene::new(&design).expect("a scene");
+    let places: Vec<[f64; 3]> = spread(points.height_m.len(), 300)
+        .into_iter()
+        .map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]])
+        .collect();
+    let pull = pull(&scene, &places, false)
+        .expect("solves")
+        .expect("cores");
+    let square = |of: &dyn Fn(&[f64; 3]) -> f64| -> f64 { places.iter().map(of).sum() };
+    let lambda = report.file.lambda_n_per_m.expect("a force constant");
+    let sideways = square(&|at| {
+        let [x, y, _] = pull.force_n(*at);
+        x * x + y * y
+    });
+    let share = (sideways / square(&|at| (lambda * at[2]).powi(2))).sqrt();
+    let found = report.file.sideways.expect("reported").pull_share;
+    let found = found.expect("of cores");
+    assert!((found / share - 1.0).abs() < 0.05, "{found} {share}");
+    assert!(share > 5e-4, "{share}");
+    let felt = report
+        .file
+        .headline
+        .expect("solved")
+        .felt
+        .expect("currents");
+    let said = felt
+        .not_modelled
+        .iter()
+        .any(|one| one.starts_with(SIDEWAYS_PULL));
+    assert!(said, "{:?}", felt.not_modelled);
 }

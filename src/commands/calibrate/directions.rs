@@ -77,11 +77,7 @@ impl Calibration<'_> {
         let positions_m: Vec<_> = rows.iter().map(place).collect();
         let coils = scene.coils.len();
         let vectors = scene.force_vectors_n_per_a(&self.solved.forces, &positions_m, progress)?;
-        let pull = if scene.design.magnet.passive_force {
-            passive::pull(scene, &positions_m, false)?
-        } else {
-            None
-        };
+        let pull = passive::counted(scene, &positions_m)?;
         let offset_n = pull.map(|pull| pull.forces_z_n(&positions_m));
         let mut feedback = Feedback::new(scene, force.direction.is_vector())?;
         let mut currents = vec![0.0; coils];

@@ -1,6 +1,8 @@
 //! The unpowered steel's pull where the design has cores and does not count it: how large it is.
 
 use crate::RunError;
+use crate::bundle::headline::SIDEWAYS_PULL;
+use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::LeftOut;
 use crate::commands::lambda::{ForcePoints, LambdaReport};
 use crate::scene::Scene;
@@ -86,6 +88,18 @@ impl IgnoredPull {
             Self::Unknown(_) => None,
         }
     }
+}
+
+/// The sideways pull where the upward one is counted; `None` where it is not, or without currents.
+pub(crate) fn sideways_left_out(file: &LambdaFile) -> Option<LeftOut> {
+    let error_cost = file.sideways?.pull_share?;
+    Some(LeftOut {
+        what: SIDEWAYS_PULL.to_owned(),
+        why: "requests and currents count the upward one alone; the cost is relative to the requested force, \
+              root mean square"
+            .to_owned(),
+        error_cost,
+    })
 }
 
 impl Measured {

@@ -59,7 +59,7 @@ mod text;
 mod vtk;
 
 pub use crate::report::bundle_files::PAGE_FILE;
-pub(crate) use ignored_pull::IgnoredPull;
+pub(crate) use ignored_pull::{IgnoredPull, sideways_left_out};
 use needed_map::NeededMap;
 pub(crate) use needed_map::{needed_coils, needed_nodes};
 use plan::Plan;
@@ -536,6 +536,7 @@ impl Calibration<'_> {
             lambda.warnings.extend(ignored.warning(lambda.file.jnd));
             needed.left_out.push(ignored.left_out());
         }
+        needed.left_out.extend(sideways_left_out(&lambda.file));
         self.add_to_headline(&mut lambda, heights, &needed, passive.as_ref(), progress)?;
         let default = self.options.lambda.default_error;
         let runtime = Some((&design.workspace, fine_points.grid.samples()));

@@ -340,11 +340,8 @@ impl Object {
         let mut positions_m = of_lambda.positions_m.clone();
         let mut forces = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
         let upward: Vec<f64> = forces.iter().map(|force| force[2]).collect();
-        let mut passive_n = if scene.design.magnet.passive_force {
-            passive::pull(scene, &positions_m, false)?.map(|pull| pull.forces_z_n(&positions_m))
-        } else {
-            None
-        };
+        let pull = passive::counted(scene, &positions_m)?;
+        let mut passive_n = pull.map(|pull| pull.forces_z_n(&positions_m));
         progress.begin("lambda", 1);
         let problem = ForceProblem {
             forces_n_per_a: &upward,

@@ -318,10 +318,14 @@ impl Discretize {
             sheet.line("deviation", &between(deviation));
         }
         if let Some(requested) = &summary.requested {
+            let jumps = requested.jumps.map_or_else(String::new, |share| {
+                let share = percent(share);
+                format!("\nleft out: {share} of the points, where the surface jumps")
+            });
             sheet.line(
                 "error",
                 &format!(
-                    "{} of the height between the points {} the requested {}",
+                    "{} of the height between the points {} the requested {}{jumps}",
                     percent(requested.between_points),
                     if requested.met { "holds" } else { "exceeds" },
                     percent(requested.error)

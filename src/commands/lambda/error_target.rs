@@ -110,11 +110,7 @@ impl Trial<'_> {
         let positions = &points.positions_m;
         let forces_n_per_a =
             (self.field).tried_forces_n_per_a(scene, self.solved, positions, progress)?;
-        let pull = if scene.design.magnet.passive_force {
-            passive::pull(scene, positions, false)?
-        } else {
-            None
-        };
+        let pull = passive::counted(scene, positions)?;
         let offset_n = pull.map(|pull| pull.forces_z_n(positions));
         let resistance_ohm = scene.resistances_ohm();
         let unwired = ForceProblem {

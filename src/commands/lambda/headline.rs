@@ -86,8 +86,7 @@ impl PosedProblem<'_> {
                     .to_owned(),
             });
         }
-        let feedback = GivenForce::with_feedback(&self.problem, lambda)
-            .map_err(|limits| RunError::Input(limits.to_string()))?;
+        let feedback = GivenForce::with_feedback(&self.problem, lambda)?;
         let headline = Headline::new(lambda, file.given_force, feedback, budget);
         Ok(Some((headline, amplification)))
     }

@@ -6,6 +6,7 @@ use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::lambda::lowest_requested_m;
 use crate::map::FieldMap;
 use crate::numerics::lagrange::stencil;
+use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -41,8 +42,12 @@ fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
             (middle[2] >= lowest_m).then_some(middle)
         })
         .collect();
-    let every = all.len().div_ceil(MOST_PLACES).max(1);
-    all.into_iter().step_by(every).collect()
+    some_of(&all, MOST_PLACES)
+}
+
+fn some_of(places: &[[f64; 3]], most: usize) -> Vec<[f64; 3]> {
+    let some = spread(places.len(), most).into_iter();
+    some.map(|place| places[place]).collect()
 }
 
 /// A map against the field itself, over the surface between its points.
@@ -80,9 +85,7 @@ impl MapEffect<'_> {
     ) -> Result<[usize; 3], RunError> {
         let workspace = &self.scene.design.workspace;
         let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-        let all = middles(self.points);
-        let every = all.len().div_ceil(CHOOSING_PLACES).max(1);
-        let places: Vec<[f64; 3]> = all.into_iter().step_by(every).collect();
+        let places = some_of(&middles(self.points), CHOOSING_PLACES);
         let mut factor = FIRST;
         let mut samples = axes.map(|axis| axis.samples);
         for _ in 0..ATTEMPTS {

@@ -2,6 +2,7 @@
 
 use crate::bundle::lambda_file::LambdaFile;
 use crate::lambda::{Criterion, ForceProblem, Solution};
+use crate::numerics::spread::spread;
 use crate::plot::lambda::{ChosenForces, Constant, ErrorMap, LambdaPlot};
 use crate::plot::plane::{Cells, Together};
 
@@ -13,7 +14,7 @@ const STEPS: usize = 240;
 const MARGIN: f64 = 1.12;
 /// and constants are shown up to so many times the chosen one.
 const FARTHEST: f64 = 4.0;
-/// Points on no grid are drawn up to about this many.
+/// Points on no grid are drawn up to this many.
 const MOST_POINTS: usize = 20_000;
 
 impl PosedProblem<'_> {
@@ -122,11 +123,11 @@ impl PosedProblem<'_> {
                 }
             }
             None => {
-                let every = errors_mn.len().div_ceil(MOST_POINTS).max(1);
-                let places = self.points.positions_m.iter().step_by(every);
+                let some = spread(errors_mn.len(), MOST_POINTS);
+                let places = some.iter().map(|point| self.points.positions_m[*point]);
                 ErrorMap::Scattered {
                     points_mm: places.map(|p| (p[0] * 1e3, p[1] * 1e3)).collect(),
-                    errors_mn: errors_mn.into_iter().step_by(every).collect(),
+                    errors_mn: some.iter().map(|point| errors_mn[*point]).collect(),
                 }
             }
         };

@@ -12,13 +12,14 @@ use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::lambda::{self, ForceProblem};
+use crate::numerics::spread::spread;
 use crate::progress::Progress;
 
 /// Points are lifted by this share of the lowest height: small enough for first order, and large
 /// beside what forces are rounded to.
 const LIFTED_BY: f64 = 1e-3;
-/// Of more points than twice this many, and than twice the coils, every second, third and so on is
-/// taken: some of them, lifted and not, show a shift of all as well.
+/// Of more points than this many, and than the coils, so many are taken: some of them, lifted and not, show a shift of
+/// all as well.
 const ENOUGH_POINTS: usize = 600;
 
 impl PosedProblem<'_> {
@@ -73,19 +74,20 @@ impl PosedProblem<'_> {
             return Ok(None);
         }
         let unwired = &self.unwired;
-        let enough = ENOUGH_POINTS.max(unwired.coils());
-        let every = (unwired.height_m.len() / enough).max(1);
-        let here = some(unwired.forces_n_per_a, unwired.coils(), every);
-        let mut lifted_m = some(&self.points.positions_m, 1, every);
+        let number = unwired.height_m.len();
+        let chosen = spread(number, ENOUGH_POINTS.max(unwired.coils()));
+        let of = |values: &[f64]| rows_of(values, 1, &chosen);
+        let here = rows_of(unwired.forces_n_per_a, unwired.coils(), &chosen);
+        let mut lifted_m = rows_of(&self.points.positions_m, 1, &chosen);
         // Lifted only: the steel's solution was made for the points and above.
         lifted_m.iter_mut().for_each(|at| at[2] += step_m);
         let there =
             self.field
                 .forces_n_per_a("lifted", self.scene, self.solved, &lifted_m, progress)?;
-        let height_m = some(unwired.height_m, 1, every);
+        let height_m = of(unwired.height_m);
         let lifted_height_m: Vec<f64> = lifted_m.iter().map(|at| at[2]).collect();
-        let offset_n = unwired.offset_n.map(|offset| some(offset, 1, every));
-        let weights = unwired.weights.map(|weights| some(weights, 1, every));
+        let offset_n = unwired.offset_n.map(of);
+        let weights = unwired.weights.map(of);
         let lambda = |forces_n_per_a: &[f64], height_m: &[f64]| {
             let problem = ForceProblem {
                 forces_n_per_a,
@@ -108,10 +110,10 @@ impl PosedProblem<'_> {
         if here <= 0.0 {
             return Ok(None);
         }
-        let all = if every == 1 {
+        let all = if chosen.len() == number {
             "all points".to_owned()
         } else {
-            format!("one point of {every}")
+            format!("{} of the points", chosen.len())
         };
         Ok(Some(StageAccuracy {
             estimate: (there / here - 1.0).abs() * (error_m / step_m),
@@ -124,8 +126,10 @@ impl PosedProblem<'_> {
     }
 }
 
-/// Every `every`-th row of `width` values.
-fn some<T: Copy>(values: &[T], width: usize, every: usize) -> Vec<T> {
-    let rows = values.chunks_exact(width).step_by(every);
+/// The `chosen` rows of `width` values each.
+fn rows_of<T: Copy>(values: &[T], width: usize, chosen: &[usize]) -> Vec<T> {
+    let rows = chosen
+        .iter()
+        .map(|row| &values[row * width..(row + 1) * width]);
     rows.flatten().copied().collect()
 }

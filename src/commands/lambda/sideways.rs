@@ -1,25 +1,33 @@
 //! The sideways force at the chosen lambda, which the vertical problem does not see, and the felt error of the
 //! force vector.
 
+use rayon::prelude::*;
+
 use crate::RunError;
 use crate::bundle::headline::{FeltForce, FeltShares};
 use crate::bundle::lambda_file::LambdaFile;
 use crate::force_direction::RequestedForce;
 use crate::lambda::ForceProblem;
 use crate::lambda::feedback::FeedbackError;
-use crate::lambda::sideways::sideways;
-use crate::lambda::vector_feedback::{CurrentsOf, VectorProblem, render_vectors};
+use crate::lambda::sideways::{Sideways, sideways};
+use crate::lambda::vector_feedback::{CurrentsOf, VectorProblem, render_vectors_at};
+use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::passive;
+use crate::scene::passive::{self, Pull};
 use crate::scene::steel::Solved;
 
+use super::LambdaOptions;
 use super::points::ForcePoints;
-use super::{LambdaOptions, uncertain};
+use super::uncertain::{self, Chosen};
 
 /// Points looked at, at most: means and medians of a force that changes over centimetres.
-const MOST_POINTS: usize = 1000;
+const MOST_POINTS: usize = 4000;
+/// Of them those at which currents follow the position, at most,
+const MOST_FOLLOWED: usize = 1000;
+/// and those at which the steel's sideways pull is computed, half a millisecond each.
+const MOST_PULLED: usize = 100;
 
 /// Adds the study of what is uncertain, the sideways force of `file`'s currents and of feedback to it, if it has currents.
 ///
@@ -38,27 +46,19 @@ pub(crate) fn add(
     let (Some(currents_a), Some(lambda)) = (&file.currents_a, file.lambda_n_per_m) else {
         return Ok(());
     };
-    let every = points.height_m.len().div_ceil(MOST_POINTS).max(1);
-    let rows = || (0..points.height_m.len()).step_by(every);
-    let positions_m: Vec<_> = rows().map(|row| points.positions_m[row]).collect();
-    let height_m: Vec<_> = rows().map(|row| points.height_m[row]).collect();
-    let all = points.weights();
-    let weights: Option<Vec<_>> = all.map(|all| rows().map(|row| all[row]).collect());
-    let pull = if scene.design.magnet.passive_force {
-        passive::pull(scene, &positions_m, false)?
-    } else {
-        None
-    };
-    let offset_n = pull.map(|pull| pull.forces_z_n(&positions_m));
-    let vectors = field.force_vectors_n_per_a(scene, solved, &positions_m, progress)?;
+    let chosen = Chosen::new(points, MOST_POINTS);
+    let positions_m = &chosen.positions_m;
+    let pull = passive::counted(scene, positions_m)?;
+    let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(positions_m));
+    let vectors = field.force_vectors_n_per_a(scene, solved, positions_m, progress)?;
     let resistance_ohm = scene.resistances_ohm();
     let of_axis = |axis: usize| -> Vec<f64> { vectors.iter().map(|force| force[axis]).collect() };
     let [along_x, along_y, upward] = [0, 1, 2].map(of_axis);
     let given = ForceProblem {
         forces_n_per_a: &upward,
-        height_m: &height_m,
+        height_m: &chosen.height_m,
         offset_n: offset_n.as_deref(),
-        weights: weights.as_deref(),
+        weights: chosen.weights.as_deref(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -73,8 +73,7 @@ pub(crate) fn add(
     });
     let [of_x, of_y, of_z] = [0, 1, 2].map(|axis| wired[axis].problem(&given));
     let sides = [of_x.forces_n_per_a, of_y.forces_n_per_a];
-    let direction = points.directions(force);
-    let direction: Vec<[f64; 3]> = rows().map(|row| direction[row]).collect();
+    let direction = chosen.directions(points, force);
     let vectors = VectorProblem {
         upward: of_z,
         sides_n_per_a: sides,
@@ -85,11 +84,15 @@ pub(crate) fn add(
     } else {
         CurrentsOf::Upward
     };
-    let felt = |of| render_vectors(&vectors, lambda, of).map(|rendered| rendered.error_share);
-    let found = sideways(&of_z, sides, lambda, currents_a).and_then(|sideways| {
+    let all: Vec<usize> = (0..positions_m.len()).collect();
+    let some = spread(all.len(), MOST_FOLLOWED);
+    let felt = |of, points| -> Result<f64, FeedbackError> {
+        Ok(render_vectors_at(&vectors, points, lambda, of)?.error_share)
+    };
+    let found = sideways(&of_z, sides, lambda, currents_a, &some).and_then(|sideways| {
         let exact = FeltShares {
-            fixed: felt(CurrentsOf::Static(currents_a))?,
-            feedback: felt(followed)?,
+            fixed: felt(CurrentsOf::Static(currents_a), &all)?,
+            feedback: felt(followed, &some)?,
             robust: None,
         };
         Ok((sideways, exact))
@@ -98,9 +101,44 @@ pub(crate) fn add(
         FeedbackError::Problem(problem) => RunError::from(problem),
         FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),
     })?;
-    file.sideways = sideways;
+    let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
+    file.sideways = sideways.map(|found| Sideways {
+        pull_share,
+        ..found
+    });
     if let Some(headline) = &mut file.headline {
-        headline.add_felt(FeltForce::new(exact, file.uncertainty.as_ref()));
+        let study = file.uncertainty.as_ref();
+        headline.add_felt(FeltForce::new(exact, study, pull_share));
     }
     Ok(())
+}
+
+/// The steel's sideways pull, root mean square over that of the requested force: of some points, as the upward pull of
+/// all is to theirs.
+fn sideways_share(
+    pull: &Pull,
+    positions_m: &[[f64; 3]],
+    problem: &ForceProblem,
+    lambda_n_per_m: f64,
+) -> f64 {
+    let square = |point: usize, force_n: f64| {
+        problem.weights.map_or(1.0, |all| all[point]) * force_n * force_n
+    };
+    let sum = |force_n: &dyn Fn(usize) -> f64, points: &[usize]| -> f64 {
+        points
+            .iter()
+            .map(|point| square(*point, force_n(*point)))
+            .sum()
+    };
+    let some = spread(positions_m.len(), MOST_PULLED);
+    let of_point = |point: &usize| {
+        let [x_n, y_n, _] = pull.force_n(positions_m[*point]);
+        square(*point, x_n.hypot(y_n))
+    };
+    let sideways: Vec<f64> = some.par_iter().map(of_point).collect();
+    let all: Vec<usize> = (0..positions_m.len()).collect();
+    let upward = |point: usize| problem.offset_n.map_or(0.0, |all| all[point]);
+    let requested = sum(&|point| lambda_n_per_m * problem.height_m[point], &all);
+    let ratio = sideways.iter().sum::<f64>() / sum(&upward, &some);
+    (ratio * sum(&upward, &all) / requested).sqrt()
 }

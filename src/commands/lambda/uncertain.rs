@@ -8,6 +8,7 @@ use crate::lambda::uncertainty::{
     Draw, Drawn, StudyError, Surroundings, Turned, displacements_m, draws, most_points, study,
 };
 use crate::lambda::{ForceProblem, Wiring};
+use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::passive;
@@ -54,8 +55,9 @@ pub(crate) fn add(
     if given.is_none() {
         return Ok(());
     }
-    let chosen = Chosen::new(scene, points, &given)?;
     let coils = scene.coils.len();
+    let chosen = Chosen::new(points, most_points(coils));
+    check_clearance(scene, &given, &chosen.positions_m)?;
     let draws = draws(&given, chosen.positions_m.len(), coils, DRAWS);
     let displacements = displacements_m(&given);
     let positions = chosen.positions_m.iter();
@@ -114,37 +116,27 @@ pub(crate) fn add(
 }
 
 /// The points that are looked at.
-struct Chosen {
+pub(super) struct Chosen {
     rows: Vec<usize>,
-    positions_m: Vec<[f64; 3]>,
-    height_m: Vec<f64>,
-    weights: Option<Vec<f64>>,
+    pub(super) positions_m: Vec<[f64; 3]>,
+    pub(super) height_m: Vec<f64>,
+    pub(super) weights: Option<Vec<f64>>,
 }
 
 impl Chosen {
-    /// Evenly among all.
-    ///
-    /// # Errors
-    /// Bounds within which the magnet may touch the array.
-    fn new(scene: &Scene, points: &ForcePoints, given: &Uncertainty) -> Result<Self, RunError> {
-        let every = points
-            .height_m
-            .len()
-            .div_ceil(most_points(scene.coils.len()))
-            .max(1);
-        let rows: Vec<usize> = (0..points.height_m.len()).step_by(every).collect();
+    /// At most so many, evenly among all.
+    pub(super) fn new(points: &ForcePoints, most: usize) -> Self {
+        let rows = spread(points.height_m.len(), most);
         let of = |all: &[f64]| -> Vec<f64> { rows.iter().map(|row| all[*row]).collect() };
-        let chosen = Self {
+        Self {
             positions_m: rows.iter().map(|row| points.positions_m[*row]).collect(),
             height_m: of(&points.height_m),
             weights: points.weights().map(of),
             rows,
-        };
-        check_clearance(scene, given, &chosen.positions_m)?;
-        Ok(chosen)
+        }
     }
 
-    fn directions(&self, points: &ForcePoints, force: RequestedForce) -> Vec<[f64; 3]> {
+    pub(super) fn directions(&self, points: &ForcePoints, force: RequestedForce) -> Vec<[f64; 3]> {
         let all = points.directions(force);
         self.rows.iter().map(|row| all[*row]).collect()
     }
@@ -152,10 +144,7 @@ impl Chosen {
 
 /// The upward force without currents at places, N; `None` where the design leaves it out.
 fn pulls_n(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Option<Vec<f64>>, RunError> {
-    if !scene.design.magnet.passive_force {
-        return Ok(None);
-    }
-    let pull = passive::pull(scene, places_m, false)?;
+    let pull = passive::counted(scene, places_m)?;
     Ok(pull.map(|pull| pull.forces_z_n(places_m)))
 }
 
