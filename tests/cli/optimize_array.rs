@@ -580,3 +580,37 @@ fn a_sweep_searches_an_array_for_every_limit() {
         refused.err
     );
 }
+
+/// Six coils in air under a wedge, which tie in pairs by symmetry.
+fn six_coils(place: &Place) {
+    place.write(
+        "six.toml",
+        "name = 'six'\n[coil]\ninner_diameter_mm = 10.0\nouter_diameter_mm = 25.6\nlength_mm = 30.0\n\
+         [wire]\ndiameter_mm = 0.6\n[array]\nrows = 2\ncolumns = 3\npitch_mm = 30.0\n[magnet]\n[supply]\n\
+         current_max_a = [1.0, 2.0, 1.5, 2.0, 2.0, 2.0]\ntotal_current_max_a = 6.0\nvoltage_v = 24.0\n[limits]\n\
+         outer_diameter_max_mm = 29.0\nresistance_max_ohm = 4.0\n[search]\n\
+         coil.outer_diameter_mm = [16.0, 29.0]\ncoil.length_mm = [15.0, 45.0]\narray.pitch_mm = [27.0, 45.0]\n",
+    );
+    place.write(
+        "wedge.toml",
+        "name = 'wedge'\nprimitive = 'wedge'\nside_mm = 60\nlow_mm = 25\nhigh_mm = 40\n[points]\n\
+         x_mm = [-30.0, 30.0, 31]\ny_mm = [-30.0, 30.0, 31]\n",
+    );
+}
+
+/// Coils that only push give no upright force without a sideways part: raising limits does not help, reversing does.
+#[test]
+fn regression_a_force_vector_out_of_reach_was_called_no_force() {
+    let place = Place::new();
+    six_coils(&place);
+    let mut arguments = vec!["optimize", "six.toml", "--for", "wedge.toml"];
+    arguments.extend(["--constant", "vector", "--evaluations", "4"]);
+    let run = place.run(&arguments).ends(3);
+    for said in [
+        "without a sideways part for wedge",
+        "at point 0",
+        "current_min_a",
+    ] {
+        assert!(run.err.contains(said), "{said}: {}", run.err);
+    }
+}

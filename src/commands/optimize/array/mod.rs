@@ -13,7 +13,7 @@ use std::path::Path;
 
 pub use result::*;
 
-use self::physics::{ArrayPhysics, Constant};
+use self::physics::{ArrayPhysics, Constant, OtherAim};
 use self::pitch_bound::{PitchBound, pitch_bound};
 use super::Document;
 use crate::RunError;
@@ -27,6 +27,7 @@ use crate::commands::evaluate::evaluate;
 use crate::design::search::SearchKey;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need};
+use crate::lambda::feedback::NoLambda;
 use crate::numerics::mixed_search::{MET, Settings};
 use crate::progress::{Interrupted, Progress, interruptible, to_its_end};
 use crate::scene::Scene;
@@ -221,20 +222,30 @@ fn before(
     progress: &dyn Progress,
 ) -> Result<Before, RunError> {
     let rendered = |level| -> Result<Physical, RunError> {
-        let physical = physics.rendered(design, 0.0, level)?;
+        let physical = physics.rendered_or_why(design, 0.0, level)?;
         progress.advance(1);
-        physical.ok_or_else(|| {
-            let names: Vec<&str> = shapes
-                .iter()
-                .map(|shape| shape.document.name.as_str())
-                .collect();
-            RunError::Input(Refused::NothingRendered(names.join(", ")).to_string())
+        physical.map_err(|nothing| {
+            let name = &shapes[nothing.shape].document.name;
+            RunError::Input(nothing_rendered(name, physics.aim().constant, nothing.why))
         })
     };
+    // Full accuracy first: points are named by their number in the shape.
+    let full = rendered(Level::Full)?;
     Ok(Before {
         search: rendered(Level::Search)?,
-        full: rendered(Level::Full)?,
+        full,
     })
+}
+
+/// Why a search cannot begin at a design that renders nothing of a shape.
+fn nothing_rendered(shape: &str, constant: Constant, why: Option<NoLambda>) -> String {
+    match (constant, why) {
+        (Constant::Other(OtherAim::Vector), Some(why)) => format!(
+            "the given design renders no force without a sideways part for {shape} ({why}), so there is nothing to \
+             compare with: let currents flow both ways (supply.current_min_a below 0), or add coils"
+        ),
+        _ => Refused::NothingRendered(shape.to_owned()).to_string(),
+    }
 }
 
 /// The limits of the best array and of the given one, and whether the best one meets its own.

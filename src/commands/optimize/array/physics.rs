@@ -17,7 +17,7 @@ use crate::commands::lambda::ForcePoints;
 use crate::commands::lambda::placement::Placed;
 use crate::design::{Design, Limits};
 use crate::force_direction::RequestedForce;
-use crate::lambda::feedback::{FeedbackError, Span, reachable, render};
+use crate::lambda::feedback::{FeedbackError, NoLambda, Span, reachable, render};
 use crate::lambda::vector_feedback::{
     CurrentsOf, VectorProblem, reachable_vectors, render_vectors,
 };
@@ -130,6 +130,15 @@ const SEARCH_SAMPLES: usize = 31;
 pub const SEARCH_TOLERANCE: f64 = 1e-2;
 /// The same of arrays with a plate or other steel, whose finer panels take ten times as long.
 const IRON_SEARCH_TOLERANCE: f64 = 0.1;
+
+/// A shape of which nothing is rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Unrendered {
+    /// Which.
+    pub shape: usize,
+    /// Why, where a point decides.
+    pub why: Option<NoLambda>,
+}
 
 /// The shapes over arrays of any design.
 pub struct ArrayPhysics<'a> {
@@ -280,11 +289,23 @@ impl<'a> ArrayPhysics<'a> {
         raised_m: f64,
         level: Level,
     ) -> Result<Option<Physical>, RunError> {
+        Ok(self.rendered_or_why(design, raised_m, level)?.ok())
+    }
+
+    /// The same, or of which shape nothing is rendered.
+    ///
+    /// # Errors
+    /// See [`Self::rendered`].
+    pub fn rendered_or_why(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Result<Physical, Unrendered>, RunError> {
         let scene = Scene::with_tolerance(design, self.tolerance(level, design))?;
         let positions = self.positions_m(raised_m, level);
         let lowest_m = positions.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
         let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
-        let coils = scene.coils.len();
         let sides = match self.aim.constant {
             Constant::Other(OtherAim::Vector) => {
                 Some(scene.force_vectors_n_per_a(&solved, &positions, &Silent)?)
@@ -313,28 +334,14 @@ impl<'a> ArrayPhysics<'a> {
             total_max_a: design.supply.total_current_max_a,
             resistance_ohm: &resistance_ohm,
         };
-        let (mut merits, mut vectors) = (Vec::new(), sides.as_deref());
-        let mut used = UsedPower::default();
-        for (points, problem) in self.points(level).iter().zip(self.of_shapes(all, level)) {
-            let own = vectors.map(|all| all.split_at(problem.points() * coils));
-            vectors = own.map(|(_, others)| others);
-            let shape = Rendering::new(problem, own.map(|(own, _)| own), points);
-            match self.merit(&shape)? {
-                Some(merit) if merit > 0.0 => {
-                    let own = self.used(&shape, merit, &design.limits)?;
-                    used = UsedPower {
-                        static_w: largest(used.static_w, own.static_w),
-                        feedback_w: largest(used.feedback_w, own.feedback_w),
-                    };
-                    merits.push(merit);
-                }
-                _ => return Ok(None),
-            }
-        }
+        let (merits, used) = match self.merits(all, sides.as_deref(), level, &design.limits)? {
+            Ok(merits) => merits,
+            Err(nothing) => return Ok(Err(nothing)),
+        };
         let (inductance_h, core_field_t) = Single::essentials(&scene)?;
         let in_air = neighbours::in_air(&scene, scene.tolerances.inductances);
         let (matrix, _) = neighbours::inductances(&solved, in_air);
-        Ok(Some(Physical {
+        Ok(Ok(Physical {
             merits,
             inductance_h: if design.has_iron() {
                 largest_self_inductance_h(&matrix)
@@ -347,15 +354,49 @@ impl<'a> ArrayPhysics<'a> {
         }))
     }
 
-    /// The force constant, or the inverse of the error; `None` where nothing is rendered.
-    fn merit(&self, shape: &Rendering<'_>) -> Result<Option<f64>, RunError> {
+    /// The merit of every shape and the heat that they take, from the problem of all their points and, for the force
+    /// vector, its forces along x, y and z.
+    fn merits(
+        &self,
+        all: ForceProblem<'_>,
+        sides: Option<&[[f64; 3]]>,
+        level: Level,
+        limits: &Limits,
+    ) -> Result<Result<(Vec<f64>, UsedPower), Unrendered>, RunError> {
+        let coils = all.coils();
+        let (mut merits, mut vectors) = (Vec::new(), sides);
+        let mut used = UsedPower::default();
+        let shapes = self.points(level).iter().zip(self.of_shapes(all, level));
+        for (shape, (points, problem)) in shapes.enumerate() {
+            let own = vectors.map(|all| all.split_at(problem.points() * coils));
+            vectors = own.map(|(_, others)| others);
+            let rendering = Rendering::new(problem, own.map(|(own, _)| own), points);
+            let merit = match self.merit(&rendering)? {
+                Ok(merit) if merit > 0.0 => merit,
+                Ok(_) => return Ok(Err(Unrendered { shape, why: None })),
+                Err(why) => return Ok(Err(Unrendered { shape, why })),
+            };
+            let own = self.used(&rendering, merit, limits)?;
+            used = UsedPower {
+                static_w: largest(used.static_w, own.static_w),
+                feedback_w: largest(used.feedback_w, own.feedback_w),
+            };
+            merits.push(merit);
+        }
+        Ok(Ok((merits, used)))
+    }
+
+    /// The force constant, or the inverse of the error; where nothing is rendered, why, as far as a point decides.
+    fn merit(&self, shape: &Rendering<'_>) -> Result<Result<f64, Option<NoLambda>>, RunError> {
         let problem = &shape.problem;
         if let (Constant::ERROR, Some(lambda_n_per_m)) = (self.aim.constant, self.aim.at_n_per_m) {
             let error = relative_error(problem, lambda_n_per_m)?;
-            return Ok(error.map(|error| error.max(LEAST_ERROR).recip()));
+            return Ok(error
+                .map(|error| error.max(LEAST_ERROR).recip())
+                .ok_or(None));
         }
         if let Some(criterion) = self.aim.constant.criterion() {
-            return Ok(constant(problem, &self.settings(criterion, None))?);
+            return Ok(constant(problem, &self.settings(criterion, None))?.ok_or(None));
         }
         let mut span = Span::default();
         let reach = match shape.vector() {
@@ -363,7 +404,8 @@ impl<'a> ArrayPhysics<'a> {
             Some(vector) => reachable_vectors(&vector).map_err(refused)?,
         };
         span.add(problem.height_m, &reach);
-        Ok(span.largest().ok().map(|largest| largest.lambda_n_per_m))
+        let largest = span.largest().map(|largest| largest.lambda_n_per_m);
+        Ok(largest.map_err(Some))
     }
 
     fn settings(&self, criterion: Criterion, at_n_per_m: Option<f64>) -> Settings {
