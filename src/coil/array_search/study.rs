@@ -131,8 +131,8 @@ const PATIENCE: usize = 2;
 const NO_BETTER: f64 = 1e-3;
 /// Share of a range by which the starts of a descent lie apart.
 const APART: f64 = 0.2;
-/// Steps to which neighbours' lengths are rounded, mm.
-const STEPS_MM: [f64; 2] = [0.5, 1.0];
+/// Steps to which neighbours' lengths are rounded, mm: every array of the coarser one is one of the finer one too.
+const STEPS_MM: [f64; 2] = [1.0, 0.5];
 /// How much work the trade-offs are worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Effort {
@@ -378,42 +378,21 @@ impl<'s, 'a> View<'s, 'a> {
         }
     }
 
-    /// The best design with lengths of half and whole millimetres, found one after the other.
+    /// The best designs with lengths of half and whole millimetres.
     fn neighbours(&mut self) -> Result<Vec<Neighbour>, Interrupted> {
-        let mut all = Vec::new();
+        let mut all: Vec<Neighbour> = Vec::new();
         for step in STEPS_MM {
-            let mut x = self.best.x.clone();
-            let mut fixed: Vec<(usize, f64)> = Vec::new();
-            let variables = self.problem.space.variables().to_vec();
-            let continuous = variables
-                .iter()
-                .enumerate()
-                .filter(|(_, v)| v.values == Values::Continuous);
-            for (index, variable) in continuous {
-                let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
-                let near = [
-                    (x[index] / step).floor() * step,
-                    (x[index] / step).ceil() * step,
-                ];
-                let tried = near
-                    .iter()
-                    .filter(|v| (variable.low..=variable.high).contains(*v))
-                    .filter_map(|v| {
-                        let held: Vec<_> = fixed.iter().copied().chain([(index, *v)]).collect();
-                        let ended =
-                            self.search
-                                .climb_otherwise(&self.surrogate, &judge, &x, &held)?;
-                        Some((ended.1.judged.merit(), *v, ended.0))
-                    });
-                let Some((_, value, at)) = tried.reduce(|a, b| if b.0 > a.0 { b } else { a })
-                else {
-                    break;
-                };
-                fixed.push((index, value));
-                x = at;
-            }
-            let values = self.named(&x);
-            if let Some(objective) = self.evaluated(x)? {
+            let rounded = match self.rounded(step) {
+                Some(x) => {
+                    let values = self.named(&x);
+                    let objective = self.evaluated(x)?;
+                    objective.map(|objective| (values, objective))
+                }
+                None => None,
+            };
+            let coarser = all.last().map(|one| (one.values.clone(), one.objective));
+            let best = [coarser, rounded].into_iter().flatten();
+            if let Some((values, objective)) = best.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
                 all.push(Neighbour {
                     what: format!("lengths of {step} mm steps"),
                     values,
@@ -421,7 +400,37 @@ impl<'s, 'a> View<'s, 'a> {
                 });
             }
         }
+        all.reverse();
         Ok(all)
+    }
+
+    /// The best design with lengths that are multiples of `step`, rounded one after the other, by the surrogate; `None`
+    /// where one has no such value.
+    fn rounded(&self, step: f64) -> Option<Vec<f64>> {
+        let mut x = self.best.x.clone();
+        let mut fixed: Vec<(usize, f64)> = Vec::new();
+        let variables = self.problem.space.variables().iter().enumerate();
+        for (index, variable) in variables.filter(|(_, v)| v.values == Values::Continuous) {
+            let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
+            let near = [
+                (x[index] / step).floor() * step,
+                (x[index] / step).ceil() * step,
+            ];
+            let tried = near
+                .iter()
+                .filter(|v| (variable.low..=variable.high).contains(*v))
+                .filter_map(|v| {
+                    let held: Vec<_> = fixed.iter().copied().chain([(index, *v)]).collect();
+                    let ended = self
+                        .search
+                        .climb_otherwise(&self.surrogate, &judge, &x, &held)?;
+                    Some((ended.1.judged.merit(), *v, ended.0))
+                });
+            let (_, value, at) = tried.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+            fixed.push((index, value));
+            x = at;
+        }
+        Some(x)
     }
 
     /// Computes the best designs of less and more mass, heat and time, one from the next.

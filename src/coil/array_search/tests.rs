@@ -291,3 +291,46 @@ fn regression_the_trade_offs_were_those_of_one_number_of_coils() {
     };
     assert!(settling.windows(2).all(rises), "{settling:?}");
 }
+
+/// Best at a bore of 7.35 mm, and worse than about it at 7.5 mm alone, which no surrogate sees.
+struct BadAtOneBore;
+
+impl Physics for BadAtOneBore {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let bore_mm = (design.coil.as_ref()).map_or(0.0, |coil| 1e3 * coil.inner_diameter_m);
+        let part = if (bore_mm - 7.5).abs() < 1e-6 {
+            0.9
+        } else {
+            1.0
+        };
+        let one = OnAxis.compute(design, raised_m, level)?;
+        Ok(one.map(|one| Physical {
+            merits: vec![part * (-((bore_mm - 7.35) / 10.0).powi(2)).exp()],
+            ..one
+        }))
+    }
+}
+
+/// Every array of whole millimetres is one of half millimetres, and was better than the best of these.
+#[test]
+fn regression_half_millimetres_were_worse_than_whole_ones() {
+    let design = design(ONE_COIL);
+    let mut request = request();
+    request.settings.evaluations = 30;
+    let all = problems(&design, &request, &[1.0], &BadAtOneBore).expect("a search");
+    let mut found = run(&all, &design, &request)
+        .expect("not interrupted")
+        .expect("a design");
+    let study = study(&mut found, &design).expect("not interrupted");
+    let [half, whole] = &study.neighbours[..] else {
+        panic!("{:?}", study.neighbours);
+    };
+    assert!(half.what.contains(" 0.5 mm") && whole.what.contains(" 1 mm"));
+    assert!(half.objective >= whole.objective, "{half:?} {whole:?}");
+    assert!(whole.objective > 0.95, "{whole:?}");
+}
