@@ -598,6 +598,26 @@ fn six_coils(place: &Place) {
     );
 }
 
+/// Coarse forces have coils that tie by symmetry a little apart, and the last breakpoint at 1e5 times its place.
+#[test]
+fn regression_a_search_of_lambda_saturation_followed_rounding() {
+    let place = Place::new();
+    six_coils(&place);
+    let mut arguments = vec!["optimize", "six.toml", "--for", "wedge.toml"];
+    arguments.extend(["--constant", "saturation", "--evaluations", "30"]);
+    arguments.extend(["--starts", "1", "--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    assert!(number(&result, "gain") > 1.0, "{}", result["gain"]);
+    let search = &result["levels"][0];
+    assert_eq!(search["level"], "search");
+    assert!(number(search, "lambda_error") < 1e-3, "{search}");
+    let warnings = result["warnings"].to_string();
+    assert!(
+        warnings.contains("lambda_saturation of wedge is "),
+        "{warnings}"
+    );
+}
+
 /// Coils that only push give no upright force without a sideways part: raising limits does not help, reversing does.
 #[test]
 fn regression_a_force_vector_out_of_reach_was_called_no_force() {

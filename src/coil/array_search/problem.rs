@@ -8,7 +8,7 @@ use fluxform_base::progress::Interrupted;
 use fluxform_base::units::STEEL_DENSITY_KG_PER_M3;
 use fluxform_design::{Design, Limits};
 use fluxform_numerics::mixed_search::descent::Judged;
-use fluxform_numerics::mixed_search::{MET, Problem, Variable};
+use fluxform_numerics::mixed_search::{MET, Problem, Sample, Search, Variable};
 
 use super::positions::closest;
 use super::space::{Axis, Space};
@@ -170,6 +170,9 @@ impl Bounded {
 const ROUNDING: f64 = 1e-12;
 /// Distance that the search keeps from limits that are not whole lengths of wire: lengths are rounded later.
 const MARGIN: f64 = 3e-5;
+/// Largest change of the correction, as a logarithm, that one design teaches about all others: several times what the
+/// coarsest search's forces, off by a tenth, explain. Beyond it, the search does not know that design.
+const LARGEST_CORRECTION: f64 = 0.5;
 /// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
 const LEAST_CORE_MM: f64 = 1.0;
 /// Distance of the magnet's centre from the core's top, mm, beside which a millimetre counts.
@@ -198,6 +201,8 @@ pub struct ArrayProblem<'a> {
     left_out: Vec<&'static str>,
     /// The correction of the search's outputs to full accuracy.
     correction: RwLock<Vec<f64>>,
+    /// Samples that were computed to full accuracy, by their variables; `None` where there is no such design.
+    known: RwLock<Vec<(Vec<f64>, Option<Physical>)>>,
 }
 
 impl<'a> ArrayProblem<'a> {
@@ -218,6 +223,7 @@ impl<'a> ArrayProblem<'a> {
             room,
             left_out: Vec::new(),
             correction: RwLock::default(),
+            known: RwLock::default(),
         };
         problem.left_out = problem.unchanged_limits();
         problem
@@ -255,26 +261,89 @@ impl<'a> ArrayProblem<'a> {
         outputs.iter().zip(added).map(|(a, b)| a + b).collect()
     }
 
+    /// Begins with the correction of the given design, whose merits at full accuracy are the reference.
+    pub fn begin_with(&self, searched: &Physical, full: &Physical) {
+        *self
+            .correction
+            .write()
+            .unwrap_or_else(PoisonError::into_inner) = difference(full, &searched.outputs());
+    }
+
     /// Computes the design at `x` to full accuracy; by as much as its outputs differ from those of the
-    /// search, all of these are corrected from now on.
+    /// search, all of these are corrected from now on, unless that would change one by a large part.
     ///
     /// # Errors
     /// Interruption.
     pub fn correct(&self, x: &[f64], searched: &[f64]) -> Result<Option<Physical>, Interrupted> {
-        let full = self.physical(x, Level::Full)?;
+        let full = self.compute_fully(x)?;
         if let Some(full) = &full {
-            let difference = full
-                .outputs()
-                .iter()
-                .zip(searched)
-                .map(|(a, b)| a - b)
-                .collect();
-            *self
+            let new = difference(full, searched);
+            let mut correction = self
                 .correction
                 .write()
-                .unwrap_or_else(PoisonError::into_inner) = difference;
+                .unwrap_or_else(PoisonError::into_inner);
+            let before = correction.iter().copied().chain(std::iter::repeat(0.0));
+            let mut changes = new.iter().zip(before).map(|(new, old)| (new - old).abs());
+            if changes.all(|change| change <= LARGEST_CORRECTION) {
+                *correction = new;
+            }
         }
         Ok(full)
+    }
+
+    /// The design at `x` at full accuracy, which its sample has from now on.
+    ///
+    /// # Errors
+    /// Interruption.
+    pub fn compute_fully(&self, x: &[f64]) -> Result<Option<Physical>, Interrupted> {
+        if let Some(full) = self.fully(x) {
+            return Ok(full);
+        }
+        let full = self.physical(x, Level::Full)?;
+        self.known
+            .write()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push((x.to_vec(), full.clone()));
+        Ok(full)
+    }
+
+    fn fully(&self, x: &[f64]) -> Option<Option<Physical>> {
+        let known = self.known.read().unwrap_or_else(PoisonError::into_inner);
+        let at_x = known.iter().find(|(at, _)| at == x);
+        at_x.map(|(_, full)| full.clone())
+    }
+
+    /// Whether the design at `x` was computed to full accuracy.
+    #[must_use]
+    pub fn is_known_fully(&self, x: &[f64]) -> bool {
+        self.fully(x).is_some()
+    }
+
+    /// The properties of a sample: at full accuracy where that is known, else as its corrected outputs have them.
+    #[must_use]
+    pub fn properties(&self, sample: &Sample) -> Option<Physical> {
+        match self.fully(&sample.x) {
+            Some(full) => full,
+            None => self.estimate(sample.outputs.as_ref()?),
+        }
+    }
+
+    /// Objective and limits of a sample with these properties.
+    #[must_use]
+    pub fn judged_sample(&self, sample: &Sample) -> Option<Judged> {
+        let physical = self.properties(sample)?;
+        Some(self.judged(Some(&physical), &self.bounds(&sample.x, Some(&physical))))
+    }
+
+    /// The best sample of a search with these properties: of those that meet the limits, or that breaks them least.
+    #[must_use]
+    pub fn best<'s>(&self, search: &'s Search<'_>) -> Option<(&'s Sample, Judged)> {
+        let samples = search.samples().iter();
+        let judged = samples.filter_map(|sample| Some((sample, self.judged_sample(sample)?)));
+        let rank = |judged: &Judged| (judged.excess() <= MET, judged.merit());
+        judged
+            .filter(|(_, judged)| judged.merit().is_finite())
+            .reduce(|a, b| if rank(&b.1) > rank(&a.1) { b } else { a })
     }
 
     /// The computed properties of the design as it is made.
@@ -488,6 +557,12 @@ impl<'a> ArrayProblem<'a> {
     pub fn index(&self, axis: Axis) -> Option<usize> {
         self.space.axes().iter().position(|known| *known == axis)
     }
+}
+
+/// By how much the logarithms of outputs at full accuracy are above those of the search.
+fn difference(full: &Physical, searched: &[f64]) -> Vec<f64> {
+    let pairs = full.outputs().into_iter().zip(searched);
+    pairs.map(|(full, searched)| full - searched).collect()
 }
 
 /// Bounds that keep all feet on the plate.

@@ -73,6 +73,35 @@ impl Candidate {
     pub fn is_feasible(&self) -> bool {
         self.bounds.iter().all(Bounded::is_met)
     }
+
+    /// The larger, the better: whether it meets every limit, then its merit.
+    fn rank(&self, problem: &ArrayProblem) -> (bool, f64) {
+        let judged = problem.judged(Some(&self.physical), &self.bounds);
+        (self.is_feasible(), judged.merit())
+    }
+
+    /// The design at `x` to full accuracy.
+    fn of(problem: &ArrayProblem, x: &[f64], physical: Physical) -> Self {
+        let x = problem.space.made(x);
+        Self {
+            bounds: problem.bounds(&x, Some(&physical)),
+            x,
+            physical,
+            level: Level::Full,
+        }
+    }
+
+    /// The given design, as far as the search's ranges hold it, where that is of the problem's choice and meets every
+    /// limit.
+    fn given(problem: &ArrayProblem, design: &Design) -> Result<Option<Self>, Interrupted> {
+        if !problem.space.holds(design) {
+            return Ok(None);
+        }
+        let x = problem.space.given(design);
+        let physical = problem.compute_fully(&x)?;
+        let given = physical.map(|physical| Self::of(problem, &x, physical));
+        Ok(given.filter(Self::is_feasible))
+    }
 }
 
 /// A choice of layout, magnet and core, and the best array of it that was computed.
@@ -92,7 +121,8 @@ pub struct SearchedChoice {
     pub plate: bool,
     /// Arrays of it that were computed.
     pub evaluations: usize,
-    /// The largest objective within the limits, at the accuracy of the search; null where none was met.
+    /// The largest objective within the limits, at the accuracy of the search where it was not searched to its end; null
+    /// where none was met.
     pub objective: Option<f64>,
     /// The array, by key.
     pub values: BTreeMap<String, f64>,
@@ -104,7 +134,7 @@ pub struct SearchedChoice {
 impl SearchedChoice {
     fn of(problem: &ArrayProblem, search: &Search) -> Self {
         let space = &problem.space;
-        let best = search.best();
+        let best = problem.best(search);
         let values = best.as_ref().map_or_else(BTreeMap::new, |(sample, _)| {
             space.named(&space.made(&sample.x))
         });
@@ -162,14 +192,10 @@ impl Found<'_> {
     /// # Errors
     /// Interruption.
     pub(super) fn go_on(&mut self, evaluations: usize) -> Result<bool, Interrupted> {
-        let value = |best: &Candidate| {
-            let judged = self.problem.judged(Some(&best.physical), &best.bounds);
-            (best.is_feasible(), judged.merit())
-        };
-        let known = value(&self.best);
+        let known = self.best.rank(self.problem);
         let since = self
-            .search
-            .best()
+            .problem
+            .best(&self.search)
             .filter(|(_, judged)| judged.excess() <= MET);
         if since.is_none_or(|(_, judged)| judged.merit() <= known.1 + WORTH) {
             return Ok(false);
@@ -177,9 +203,9 @@ impl Found<'_> {
         let before = self.search.samples().len();
         self.search.allow(before + evaluations);
         self.search.go_on()?;
-        let accepted = accept(self.problem, &mut self.search)?;
+        let accepted = accept(self.problem, &mut self.search, None)?;
         self.evaluations += self.search.samples().len() - before;
-        let Some(best) = accepted.filter(|best| value(best) > known) else {
+        let Some(best) = accepted.filter(|best| best.rank(self.problem) > known) else {
             return Ok(false);
         };
         self.best = Candidate {
@@ -352,7 +378,7 @@ fn finish_counts(
         search.allow(settings.evaluations);
         let ended = interruptible(|| {
             search.run(&[problem.space.given(design)])?;
-            accept(problem, search)
+            accept(problem, search, Some(design))
         });
         evaluations += search.samples().len() - before;
         match ended.and_then(|ended| ended) {
@@ -431,19 +457,20 @@ pub fn run<'a>(
         .collect();
     let (mut left_out, mut evaluations, mut interrupted) =
         halved(problems, design, settings, &mut going);
-    let Some((index, mut search)) = going.into_iter().next() else {
+    let Some(mut chosen) = going.into_iter().next() else {
         return Ok(None);
     };
-    let problem = &problems[index];
-    let before = search.samples().len();
-    search.allow(settings.evaluations.max(before + LEAST_EVALUATIONS));
-    interrupted = interrupted || is_stopped(|| search.run(&[problem.space.given(design)]));
     let accepted = match interrupted {
-        false => interruptible(|| accept(problem, &mut search)).and_then(|accepted| accepted),
+        false => interruptible(|| {
+            let all = (problems, &mut left_out[..]);
+            run_to_end(all, &mut chosen, design, settings, &mut evaluations)
+        })
+        .and_then(|accepted| accepted),
         true => Err(Interrupted),
     };
     interrupted |= accepted.is_err();
-    evaluations += search.samples().len() - before;
+    let (index, search) = chosen;
+    let problem = &problems[index];
     let mut finished = Vec::new();
     if request.every_count && !interrupted {
         let (others, more, stopped) =
@@ -490,6 +517,40 @@ pub fn run<'a>(
     }))
 }
 
+/// Searches the `chosen` problem to its end; its best design, or the given one where that is better: of a choice that
+/// was left out, it takes the place of the chosen one.
+fn run_to_end<'a>(
+    (problems, left_out): (&'a [ArrayProblem<'a>], &mut [(usize, Search<'a>)]),
+    chosen: &mut (usize, Search<'a>),
+    design: &Design,
+    settings: Settings,
+    evaluations: &mut usize,
+) -> Result<Option<Candidate>, Interrupted> {
+    let (index, search) = chosen;
+    let problem = &problems[*index];
+    let before = search.samples().len();
+    search.allow(settings.evaluations.max(before + LEAST_EVALUATIONS));
+    let ended = interruptible(|| {
+        search.run(&[problem.space.given(design)])?;
+        accept(problem, search, Some(design))
+    });
+    *evaluations += search.samples().len() - before;
+    let best = ended.and_then(|ended| ended)?;
+    let holds = |(index, _): &&mut (usize, Search)| problems[*index].space.holds(design);
+    let Some(own) = left_out.iter_mut().find(holds) else {
+        return Ok(best);
+    };
+    let given = Candidate::given(&problems[own.0], design)?;
+    let rank = best.as_ref().map(|best| best.rank(problem));
+    Ok(match given {
+        Some(given) if Some(given.rank(&problems[own.0])) > rank => {
+            std::mem::swap(chosen, own);
+            Some(given)
+        }
+        _ => best,
+    })
+}
+
 /// Whether the user's stop ended `search`, wherever it was.
 fn is_stopped<T>(search: impl FnOnce() -> Result<T, Interrupted>) -> bool {
     interruptible(search).and_then(|ended| ended).is_err()
@@ -497,8 +558,8 @@ fn is_stopped<T>(search: impl FnOnce() -> Result<T, Interrupted>) -> bool {
 
 /// The best design as the search knows it.
 fn searched(problem: &ArrayProblem, search: &Search) -> Option<Candidate> {
-    let (sample, _) = search.best()?;
-    let physical = problem.estimate(sample.outputs.as_ref()?)?;
+    let (sample, _) = problem.best(search)?;
+    let physical = problem.properties(sample)?;
     Some(Candidate {
         bounds: problem.bounds(&problem.space.made(&sample.x), Some(&physical)),
         x: sample.x.clone(),
@@ -508,11 +569,16 @@ fn searched(problem: &ArrayProblem, search: &Search) -> Option<Candidate> {
 }
 
 /// The best design computed to full accuracy; where that breaks a limit, the search goes on with
-/// what full accuracy adds.
-fn accept(problem: &ArrayProblem, search: &mut Search) -> Result<Option<Candidate>, Interrupted> {
+/// what full accuracy adds. The given design, if any, where that is better: the search's accuracy may mistake others
+/// for better ones.
+fn accept(
+    problem: &ArrayProblem,
+    search: &mut Search,
+    given: Option<&Design>,
+) -> Result<Option<Candidate>, Interrupted> {
     let mut best: Option<Candidate> = None;
     for _ in 0..CORRECTIONS {
-        let Some((sample, _)) = search.best() else {
+        let Some((sample, _)) = problem.best(search) else {
             break;
         };
         let (x, Some(outputs)) = (sample.x.clone(), sample.outputs.clone()) else {
@@ -521,21 +587,8 @@ fn accept(problem: &ArrayProblem, search: &mut Search) -> Result<Option<Candidat
         let Some(physical) = problem.correct(&x, &outputs)? else {
             break;
         };
-        let made = problem.space.made(&x);
-        let candidate = Candidate {
-            bounds: problem.bounds(&made, Some(&physical)),
-            x: made,
-            physical,
-            level: Level::Full,
-        };
-        let value = |candidate: &Candidate| {
-            problem
-                .judged(Some(&candidate.physical), &candidate.bounds)
-                .merit()
-        };
-        let better = best.as_ref().is_none_or(|b| {
-            (candidate.is_feasible(), value(&candidate)) > (b.is_feasible(), value(b))
-        });
+        let candidate = Candidate::of(problem, &x, physical);
+        let better = (best.as_ref()).is_none_or(|b| candidate.rank(problem) > b.rank(problem));
         let same = best.as_ref().is_some_and(|b| b.x == candidate.x);
         if better {
             best = Some(candidate);
@@ -546,5 +599,12 @@ fn accept(problem: &ArrayProblem, search: &mut Search) -> Result<Option<Candidat
         search.allow(search.samples().len() + CORRECTING);
         search.refine()?;
     }
-    Ok(best)
+    let rank = best.as_ref().map(|best| best.rank(problem));
+    let given = match given {
+        Some(design) => Candidate::given(problem, design)?,
+        None => None,
+    };
+    Ok(given
+        .filter(|given| Some(given.rank(problem)) > rank)
+        .or(best))
 }

@@ -456,6 +456,16 @@ impl Space {
         &self.base
     }
 
+    /// Whether `design` is of this choice: its rows and columns, magnet, core and plate.
+    pub(super) fn holds(&self, design: &Design) -> bool {
+        let rows_columns = |grid: &ArrayGrid| (SearchLayout::Grid, [grid.rows, grid.columns]);
+        let magnet_m = |of: &Design| [of.magnet.diameter_m, of.magnet.length_m];
+        let steel = |of: &Design| [of.core.is_some(), of.plate.is_some()];
+        self.layout == design.array.grid.as_ref().map(rows_columns)
+            && magnet_m(&self.base) == magnet_m(design)
+            && steel(&self.base) == steel(design)
+    }
+
     /// Coils of the array.
     #[must_use]
     pub fn coils(&self) -> usize {

@@ -317,7 +317,7 @@ impl<'s, 'a> View<'s, 'a> {
     fn evaluated(&mut self, x: Vec<f64>) -> Result<Option<f64>, Interrupted> {
         self.search.evaluate(vec![x.clone()])?;
         let sample = self.search.samples().iter().find(|sample| sample.x == x);
-        let judged = sample.and_then(|sample| self.search.judged(sample));
+        let judged = sample.and_then(|sample| self.problem.judged_sample(sample));
         // A surrogate's design may be off a limit by its own error.
         let met = judged.filter(|judged| judged.excess() <= OFF);
         Ok(met.map(|judged| judged.objective().exp()))

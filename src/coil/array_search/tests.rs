@@ -292,6 +292,60 @@ fn regression_the_trade_offs_were_those_of_one_number_of_coils() {
     assert!(settling.windows(2).all(rises), "{settling:?}");
 }
 
+/// The given coil is the best one; at the accuracy of the search short coils and pairs seem to be far better.
+struct SearchIsFarOff;
+
+impl Physics for SearchIsFarOff {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let Some(coil) = &design.coil else {
+            return Ok(None);
+        };
+        let pair = design.array.positions_m.len() > 1;
+        let seems = match level {
+            Level::Search if coil.length_m < 0.05 => 1e5,
+            Level::Search if pair => 1.3,
+            Level::Full if pair => 0.7,
+            Level::Search | Level::Full => 1.0,
+        };
+        let off =
+            (coil.length_m / 0.07 - 1.0).powi(2) + (coil.inner_diameter_m / 0.02 - 1.0).powi(2);
+        let one = OnAxis.compute(design, raised_m, level)?;
+        Ok(one.map(|one| Physical {
+            merits: vec![seems * (-off).exp()],
+            ..one
+        }))
+    }
+}
+
+/// `--constant saturation` gave arrays of two thirds of the given one's force constant: all estimates were shifted by
+/// the factor of 1e5 by which the search was wrong about one design, and the given one was not among the candidates.
+#[test]
+fn regression_an_array_worse_than_the_given_one_was_the_best() {
+    let array = "[array]\nrows = 1\ncolumns = 1\npitch_mm = 50.0\n";
+    for more in ["", "array.columns = [1, 2]\n"] {
+        let design = design(&format!("{array}{ONE_COIL}{more}"));
+        let mut request = request();
+        request.settings.evaluations = 40;
+        let all = problems(&design, &request, &[1.0], &SearchIsFarOff).expect("a search");
+        let found = run(&all, &design, &request)
+            .expect("not interrupted")
+            .expect("a design");
+        assert!(found.best.is_feasible(), "{:?}", found.best.bounds);
+        let merit = found.best.physical.merits[0];
+        assert!(merit > 1.0 - 1e-9, "{more}: {merit} {:?}", found.best.x);
+        let given = found.problem.space.given(&design);
+        let sample = found.search.samples().iter().find(|s| s.x == given);
+        let outputs = sample.and_then(|s| s.outputs.as_ref()).expect("computed");
+        let estimate = found.problem.estimate(outputs).expect("known").merits[0];
+        assert!((estimate - 1.0).abs() < 0.5, "{more}: {estimate}");
+    }
+}
+
 /// Best at a bore of 7.35 mm, and worse than about it at 7.5 mm alone, which no surrogate sees.
 struct BadAtOneBore;
 

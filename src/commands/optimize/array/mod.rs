@@ -13,12 +13,13 @@ use std::path::Path;
 
 pub use result::*;
 
-use self::physics::{ArrayPhysics, Constant, OtherAim};
+use self::physics::{Aim, ArrayPhysics, Constant, OtherAim};
 use self::pitch_bound::{PitchBound, pitch_bound};
 use super::Document;
 use crate::RunError;
 use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::cli::quantity::{number, percent};
 use crate::coil::array_search::problem::{ArrayProblem, Level, Objective, Physical, Physics, Room};
 use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
 use crate::coil::array_search::study::{Study, study};
@@ -27,9 +28,10 @@ use crate::commands::evaluate::evaluate;
 use crate::design::search::SearchKey;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need};
+use crate::lambda::Criterion;
 use crate::lambda::feedback::NoLambda;
 use crate::numerics::mixed_search::{MET, Settings};
-use crate::progress::{Interrupted, Progress, interruptible, to_its_end};
+use crate::progress::{Interrupted, Progress, Silent, interruptible, to_its_end};
 use crate::scene::Scene;
 use crate::scene::drawing::drawing;
 use crate::scene::rated::Rated;
@@ -48,19 +50,13 @@ pub struct ArrayRequest {
     pub every_count: bool,
 }
 
+/// Relative error at which more of the force is missing than is there.
+const MOSTLY_MISSING: f64 = 0.5;
+
 /// The merit of every shape with the given design, at both levels.
 struct Before {
     search: Physical,
     full: Physical,
-}
-
-impl Before {
-    fn at(&self, level: Level) -> &Physical {
-        match level {
-            Level::Search => &self.search,
-            Level::Full => &self.full,
-        }
-    }
 }
 
 /// A design and its text with the limit on a coil's settling as one on the array's too, unless it has its
@@ -129,7 +125,10 @@ pub fn optimize_array(
     progress.begin("given design", 2);
     let before = before(design, shapes, physics, progress)?;
     progress.end();
-    let all = problems(design, &search, &before.search.merits, physics).map_err(refused)?;
+    let all = problems(design, &search, &before.full.merits, physics).map_err(refused)?;
+    for problem in &all {
+        problem.begin_with(&before.search, &before.full);
+    }
     progress.begin("arrays", request.settings.evaluations as u64);
     let found = run(&all, design, &search)?;
     let Some(mut found) = found else {
@@ -293,7 +292,7 @@ fn certificate(found: &Found<'_>, bound: Option<PitchBound>, gain: f64) -> Array
     let search = &found.search;
     let objective = |x: &Vec<f64>| {
         let sample = search.samples().iter().find(|sample| sample.x == *x)?;
-        Some(search.judged(sample)?.objective().exp())
+        Some(found.problem.judged_sample(sample)?.objective().exp())
     };
     ArrayCertificate {
         kind: match bound {
@@ -323,25 +322,13 @@ fn result(
         x,
         physical,
         bounds,
-        level,
+        ..
     } = &found.best;
-    let given = before.at(*level);
+    // What the search estimates is corrected to full accuracy too.
+    let given = &before.full;
     let ratios = ratios(physical, given);
     let gain = together(&ratios, request.shares.as_deref());
     let constant = physics.aim().constant;
-    let of_constant = |merit: f64| (constant != Constant::ERROR).then_some(merit);
-    let of_error = |merit: f64| (constant == Constant::ERROR).then(|| merit.recip());
-    let shape = |(index, source): (usize, &ShapeSource)| {
-        let (before, now) = (given.merits[index], physical.merits[index]);
-        ShapeGain {
-            shape: source.document.name.clone(),
-            lambda_before_n_per_m: of_constant(before),
-            lambda_n_per_m: of_constant(now),
-            relative_error_before: of_error(before),
-            relative_error: of_error(now),
-            gain: ratios[index],
-        }
-    };
     let (design_text, best) = written(document, found)?;
     let mut warnings = Vec::new();
     // After an interruption nothing more is computed.
@@ -353,6 +340,9 @@ fn result(
         }
     } else {
         let designs = [&best, document.design];
+        if constant == Constant::Static(Criterion::Saturation) {
+            warnings.extend(past_rendering(found, shapes, physics)?);
+        }
         checked(designs, [physical, given], request.tolerance, &mut warnings)?
     };
     let status = match (found.interrupted, checked.met) {
@@ -374,7 +364,7 @@ fn result(
             "smallest"
         },
         gain,
-        shapes: shapes.iter().enumerate().map(shape).collect(),
+        shapes: shape_gains(shapes, constant, [&given.merits, &physical.merits], &ratios),
         values: found.problem.space.named(x),
         limits: checked.limits,
         limits_given: checked.given,
@@ -392,6 +382,26 @@ fn result(
     })
 }
 
+/// What every shape gains, from its merits before and now and their ratio.
+fn shape_gains(
+    shapes: &[ShapeSource],
+    constant: Constant,
+    [before, now]: [&[f64]; 2],
+    gains: &[f64],
+) -> Vec<ShapeGain> {
+    let of_constant = |merit: f64| (constant != Constant::ERROR).then_some(merit);
+    let of_error = |merit: f64| (constant == Constant::ERROR).then(|| merit.recip());
+    let shape = |(index, source): (usize, &ShapeSource)| ShapeGain {
+        shape: source.document.name.clone(),
+        lambda_before_n_per_m: of_constant(before[index]),
+        lambda_n_per_m: of_constant(now[index]),
+        relative_error_before: of_error(before[index]),
+        relative_error: of_error(now[index]),
+        gain: gains[index],
+    };
+    shapes.iter().enumerate().map(shape).collect()
+}
+
 /// The limits that `evaluate`, which knows no shapes, leaves out.
 fn checks_of_shapes(design: &Design, physical: &Physical) -> Vec<(&'static str, LimitCheck)> {
     let checks = ArrayProblem::evaluated(design, Some(physical), limits::check).unwrap_or_default();
@@ -405,7 +415,7 @@ fn checks_of_shapes(design: &Design, physical: &Physical) -> Vec<(&'static str, 
 fn history(found: &Found<'_>) -> Vec<Improvement> {
     let mut grown: Vec<Improvement> = Vec::new();
     for (index, sample) in found.search.samples().iter().enumerate() {
-        let judged = found.search.judged(sample);
+        let judged = found.problem.judged_sample(sample);
         let Some(judged) = judged.filter(|judged| judged.excess() <= MET) else {
             continue;
         };
@@ -416,6 +426,43 @@ fn history(found: &Found<'_>) -> Vec<Improvement> {
         }
     }
     grown
+}
+
+/// Warns where lambda_saturation of the best design is far past what it renders: it is the last breakpoint, which lies as
+/// far as one likes where coils nearly tie.
+fn past_rendering(
+    found: &Found<'_>,
+    shapes: &[ShapeSource],
+    physics: &ArrayPhysics<'_>,
+) -> Result<Vec<String>, RunError> {
+    let space = &found.problem.space;
+    let (design, raised_m) = (space.design(&found.best.x), space.raised_m(&found.best.x));
+    let mut warnings = Vec::new();
+    for (shape, lambda_n_per_m) in shapes.iter().zip(&found.best.physical.merits) {
+        let aim = Aim {
+            constant: Constant::ERROR,
+            at_n_per_m: Some(*lambda_n_per_m),
+            ..physics.aim()
+        };
+        let alone = std::slice::from_ref(shape);
+        let errors =
+            ArrayPhysics::new(alone, aim, physics.tolerance(Level::Full, &design), &Silent)?;
+        let Some(rendered) = errors.rendered(&design, raised_m, Level::Full)? else {
+            continue;
+        };
+        let error = rendered.merits[0].recip();
+        if error > MOSTLY_MISSING {
+            warnings.push(format!(
+                "lambda_saturation of {} is {} N/m, where the force is {} off what is requested: it is the last force \
+                 constant at which a current changes, however little of the force is left; --constant jnd makes large \
+                 what is rendered",
+                shape.document.name,
+                number(*lambda_n_per_m),
+                percent(error)
+            ));
+        }
+    }
+    Ok(warnings)
 }
 
 /// One number of the shapes' ratios.

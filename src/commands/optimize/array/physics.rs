@@ -245,9 +245,12 @@ impl<'a> ArrayPhysics<'a> {
         } else {
             SEARCH_TOLERANCE
         };
+        // Where coils tie by symmetry, the last breakpoint is wherever the forces' error has them apart: the path rests at
+        // ties to 3e-8 only (`lambda`'s `rest.rs`).
+        let needs_ties = self.aim.constant == Constant::Static(Criterion::Saturation);
         match level {
-            Level::Search => Some(self.tolerance.unwrap_or(coarse).max(coarse)),
-            Level::Full => self.tolerance,
+            Level::Search if !needs_ties => Some(self.tolerance.unwrap_or(coarse).max(coarse)),
+            Level::Search | Level::Full => self.tolerance,
         }
     }
 
