@@ -121,8 +121,8 @@ pub struct SearchedChoice {
     pub plate: bool,
     /// Arrays of it that were computed.
     pub evaluations: usize,
-    /// The largest objective within the limits, at the accuracy of the search where it was not searched to its end; null
-    /// where none was met.
+    /// The largest objective within the limits; null where none was met. At the accuracy of the search where this choice
+    /// was not searched to its end and no trade-offs are requested.
     pub objective: Option<f64>,
     /// The array, by key.
     pub values: BTreeMap<String, f64>,
@@ -477,7 +477,9 @@ pub fn run<'a>(
             finish_counts(problems, design, settings, index, &mut left_out);
         finished = others;
         evaluations += more;
-        interrupted = stopped;
+        let made_known =
+            |(index, search): &(usize, Search<'_>)| know_best(&problems[*index], search);
+        interrupted = stopped || is_stopped(|| left_out.iter().try_for_each(made_known));
     }
     let (best, choices) = to_its_end(|| {
         let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));
@@ -549,6 +551,19 @@ fn run_to_end<'a>(
         }
         _ => best,
     })
+}
+
+/// Computes the best design of a search to full accuracy, and what is the best then.
+fn know_best(problem: &ArrayProblem, search: &Search) -> Result<(), Interrupted> {
+    for _ in 0..CORRECTIONS {
+        match problem.best(search) {
+            Some((sample, _)) if !problem.is_known_fully(&sample.x) => {
+                problem.compute_fully(&sample.x)?;
+            }
+            _ => break,
+        }
+    }
+    Ok(())
 }
 
 /// Whether the user's stop ended `search`, wherever it was.

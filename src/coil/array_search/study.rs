@@ -74,7 +74,7 @@ pub struct FrontPoint {
     pub quantity: &'static str,
     /// Its value, in the unit of its name.
     pub value: f64,
-    /// The objective.
+    /// The objective; to full accuracy, as the value, where every number of coils is searched to its end.
     pub objective: f64,
     /// Coils of the array.
     pub coils: usize,
@@ -114,6 +114,11 @@ pub struct TradedDesign {
     met_but: [bool; 3],
     coils: usize,
     values: BTreeMap<String, f64>,
+    /// Of which search it is a sample, the best choice's first, and its variables there.
+    source: usize,
+    x: Vec<f64>,
+    /// Whether it was computed to full accuracy.
+    full: bool,
 }
 
 /// Better designs met in the surroundings of the best from which the search goes on, at most.
@@ -133,6 +138,8 @@ const NO_BETTER: f64 = 1e-3;
 const APART: f64 = 0.2;
 /// Steps to which neighbours' lengths are rounded, mm: every array of the coarser one is one of the finer one too.
 const STEPS_MM: [f64; 2] = [1.0, 0.5];
+/// Times that a front is computed to full accuracy: the arrays that come onto it when others fall are few.
+const FRONTS: usize = 4;
 /// How much work the trade-offs are worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Effort {
@@ -218,7 +225,6 @@ fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interru
     let variables = view.variables(design)?;
     let neighbours = view.neighbours()?;
     view.trade(&here)?;
-    let mut designs = view.designs();
     found.evaluations += found.search.samples().len() - before;
     for other in &mut found.others {
         let before = other.search.samples().len();
@@ -226,11 +232,10 @@ fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interru
             View::new(other.problem, &mut other.search, other.best.clone(), effort)
         {
             view.trade(&here)?;
-            designs.extend(view.designs());
         }
         found.evaluations += other.search.samples().len() - before;
     }
-    let on_front = std::array::from_fn(|cost| on_front(&designs, cost, here[cost]));
+    let (designs, on_front) = fronts(found, &here)?;
     let mut front = Vec::new();
     for ((quantity, _), (cost, on)) in TRADED.iter().zip(on_front.iter().enumerate()) {
         let on: &Vec<usize> = on;
@@ -250,6 +255,72 @@ fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interru
         designs,
         on_front,
     })
+}
+
+/// Every design that was computed, and which of them are on the front of each quantity. Where every number of coils was
+/// searched to its end, those are computed to full accuracy first.
+fn fronts(
+    found: &Found<'_>,
+    here: &[Option<f64>; 3],
+) -> Result<(Vec<TradedDesign>, [Vec<usize>; 3]), Interrupted> {
+    let others = found.others.iter();
+    let others = others.map(|other| (other.problem, &other.search));
+    let searches: Vec<_> = std::iter::once((found.problem, &found.search))
+        .chain(others)
+        .collect();
+    let all = || -> Vec<TradedDesign> {
+        let of = |(source, (problem, search))| traded_designs(problem, search, source);
+        searches.iter().copied().enumerate().flat_map(of).collect()
+    };
+    let on_fronts = |designs: &[TradedDesign], accurate: bool| {
+        std::array::from_fn(|cost| on_front(designs, cost, here[cost], accurate))
+    };
+    if found.every_count {
+        for _ in 0..FRONTS {
+            let designs = all();
+            let on: [Vec<usize>; 3] = on_fronts(&designs, false);
+            let on = on.iter().flatten().map(|index| &designs[*index]);
+            let estimated: Vec<_> = on.filter(|design| !design.full).collect();
+            if estimated.is_empty() {
+                break;
+            }
+            for design in estimated {
+                searches[design.source].0.compute_fully(&design.x)?;
+            }
+        }
+    }
+    let designs = all();
+    let on = on_fronts(&designs, found.every_count);
+    Ok((designs, on))
+}
+
+/// Every design of a search that was computed.
+fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec<TradedDesign> {
+    let design = |sample: &Sample| {
+        let physical = problem.properties(sample)?;
+        let bounds = problem.bounds(&sample.x, Some(&physical));
+        let met_but = TRADED.map(|(_, name)| {
+            let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
+            others.all(Bounded::is_met)
+        });
+        let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
+        let [Some(mass), Some(power), Some(settling)] = costs else {
+            return None;
+        };
+        let judged = problem.judged(Some(&physical), &bounds);
+        Some(TradedDesign {
+            coils: problem.space.coils(),
+            objective: judged.objective().exp(),
+            costs: [mass, power, settling],
+            met: bounds.iter().all(Bounded::is_met),
+            met_but,
+            values: problem.space.named(&problem.space.made(&sample.x)),
+            source,
+            x: sample.x.clone(),
+            full: problem.is_known_fully(&sample.x),
+        })
+    };
+    search.samples().iter().filter_map(design).collect()
 }
 
 impl<'s, 'a> View<'s, 'a> {
@@ -538,40 +609,19 @@ impl<'s, 'a> View<'s, 'a> {
         }
         starts
     }
-
-    /// Every design that was computed.
-    fn designs(&self) -> Vec<TradedDesign> {
-        let problem = self.problem;
-        let design = |sample: &Sample| {
-            let physical = problem.estimate(sample.outputs.as_ref()?)?;
-            let bounds = problem.bounds(&sample.x, Some(&physical));
-            let met_but = TRADED.map(|(_, name)| {
-                let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
-                others.all(Bounded::is_met)
-            });
-            let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
-            let [Some(mass), Some(power), Some(settling)] = costs else {
-                return None;
-            };
-            let judged = problem.judged(Some(&physical), &bounds);
-            Some(TradedDesign {
-                coils: problem.space.coils(),
-                objective: judged.objective().exp(),
-                costs: [mass, power, settling],
-                met: bounds.iter().all(Bounded::is_met),
-                met_but,
-                values: self.named(&sample.x),
-            })
-        };
-        self.search.samples().iter().filter_map(design).collect()
-    }
 }
 
 /// For every part of `here`, what the best design costs, the best of the designs that cost at most so much and meet all limits but that of the cost,
-/// ascending: others that nothing happens to beat are not the best for what they cost.
-fn on_front(designs: &[TradedDesign], cost: usize, here: Option<f64>) -> Vec<usize> {
+/// ascending: others that nothing happens to beat are not the best for what they cost. `accurate`: of those alone that
+/// were computed to full accuracy.
+fn on_front(
+    designs: &[TradedDesign],
+    cost: usize,
+    here: Option<f64>,
+    accurate: bool,
+) -> Vec<usize> {
     let met: Vec<usize> = (0..designs.len())
-        .filter(|index| designs[*index].met_but[cost])
+        .filter(|index| designs[*index].met_but[cost] && (designs[*index].full || !accurate))
         .collect();
     let points: Vec<[f64; 2]> = met
         .iter()

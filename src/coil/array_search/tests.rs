@@ -1,5 +1,6 @@
 //! The search of arrays on forces known in closed form.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use fluxform_base::progress::Interrupted;
@@ -387,4 +388,64 @@ fn regression_half_millimetres_were_worse_than_whole_ones() {
     assert!(half.what.contains(" 0.5 mm") && whole.what.contains(" 1 mm"));
     assert!(half.objective >= whole.objective, "{half:?} {whole:?}");
     assert!(whole.objective > 0.95, "{whole:?}");
+}
+
+/// By how much the search is off differs from bore to bore.
+struct OffByBore;
+
+impl Physics for OffByBore {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let one = MoreCoilsSettleLater.compute(design, raised_m, level)?;
+        let bore_m = design.coil.as_ref().map_or(0.0, |c| c.inner_diameter_m);
+        let off = match level {
+            Level::Search => 1.0 + 0.03 * (bore_m * 1e3).sin(),
+            Level::Full => 1.0,
+        };
+        Ok(one.map(|one| Physical {
+            merits: one.merits.iter().map(|merit| merit * off).collect(),
+            ..one
+        }))
+    }
+}
+
+/// Rows of the trade-offs had what the search makes of their arrays.
+#[test]
+fn regression_the_trade_offs_were_estimates() {
+    let array = "[array]\nrows = 1\ncolumns = 1\npitch_mm = 50.0\n";
+    let design = design(&format!("{array}{ONE_COIL}array.columns = [1, 2]\n"));
+    let mut request = Request {
+        every_count: true,
+        ..request()
+    };
+    request.settings.evaluations = 40;
+    let all = problems(&design, &request, &[1.0], &OffByBore).expect("a search");
+    let mut found = run(&all, &design, &request)
+        .expect("not interrupted")
+        .expect("a design");
+    let study = study(&mut found, &design).expect("not interrupted");
+    let fully = |coils: usize, values: &BTreeMap<String, f64>| {
+        let problem = all.iter().find(|problem| problem.space.coils() == coils);
+        let problem = problem.expect("of that number");
+        let axes = problem.space.axes().iter();
+        let x: Vec<f64> = axes.map(|axis| values[&axis.key()]).collect();
+        let physical = problem.physical(&x, Level::Full).expect("not interrupted");
+        physical.expect("a design").merits[0]
+    };
+    assert!(study.front.len() > 3 && found.choices.len() == 2);
+    let front = study.front.iter();
+    let front = front.map(|point| (point.coils, &point.values, point.objective));
+    let choices = found.choices.iter();
+    let choices = choices.map(|one| (one.coils, &one.values, one.objective.expect("met")));
+    for (coils, values, objective) in front.chain(choices) {
+        let merit = fully(coils, values);
+        assert!(
+            (objective / merit - 1.0).abs() < 1e-9,
+            "{merit} {objective} {values:?}"
+        );
+    }
 }
