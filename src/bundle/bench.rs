@@ -150,7 +150,8 @@ pub struct Run {
     pub lambda_n_per_m: Option<f64>,
     /// |lambda / that of the reference - 1|.
     pub lambda_error: Option<f64>,
-    /// Largest error of the felt force, relative to the force that is to be felt.
+    /// Estimate of the largest error of the felt force anywhere on the surface, relative to the force that is to
+    /// be felt there: that of the places times a factor for what lies between them.
     pub felt_error: Option<f64>,
 }
 
@@ -166,7 +167,7 @@ impl Run {
 /// The cheapest settings for a target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Cheapest {
-    /// Largest error that either may have.
+    /// Largest error that either may have, as estimated.
     pub target: f64,
     /// Whether any combination meets it.
     pub met: bool,

@@ -19,7 +19,7 @@ pub struct InterpolationError {
 
 /// Samples find the largest error but for this factor: the cubic's error peaks within a few
 /// percent of the middle of a cell, and the samples lie in the middles of cells, faces and edges.
-const SAFETY: f64 = 1.25;
+pub const SAFETY: f64 = 1.25;
 
 /// The relative error falls as the fourth power of the step over the height: the lowest cells
 /// decide, and the highest because its stencil is one-sided.

@@ -28,9 +28,9 @@ use crate::scene::named_files::NamedContent;
 /// --max-deviation, points graded to it) and the nodes of the map, in every combination, and holds
 /// each against a run that is finer in all of them. Reports the relative error of lambda, the error
 /// of the felt force (what the currents give by the interpolated map against what they give in the
-/// refined field, at places that are neither nodes nor points) and the processor time; names the
-/// cheapest settings within 10, 1 and 0.1 %, to paste. Writes bench.json, bench.csv, two pictures per
-/// object and report.html. How long it takes is said before it begins: with --quick within a minute
+/// refined field: the largest all over the surface, its rim too, as estimated) and the processor time;
+/// names the cheapest settings within 10, 1 and 0.1 %, to paste. Writes bench.json, bench.csv, two
+/// pictures per object and report.html. How long it takes is said before it begins: with --quick within a minute
 /// of processor time, else within ten, where settings can be spared for it.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
@@ -158,7 +158,7 @@ fn of_shape(sheet: &mut Sheet, shape: &ShapeBench) {
     sheet.line(
         "object",
         &format!(
-            "{}; refined lambda {} N/m{} from {}, {} between them",
+            "{}; refined lambda {} N/m{} from {}; felt force at {}",
             shape.shape,
             number(reference.lambda_n_per_m),
             reference

@@ -10,6 +10,7 @@ pub(crate) mod command;
 mod ladder;
 mod output;
 pub mod page;
+mod places;
 mod reference;
 mod stages;
 
@@ -158,9 +159,9 @@ fn measure(
         criterion: request.lambda.settings.criterion,
         quick: request.quick,
         error_of: "lambda: relative to the refined run's. Felt force: what the currents give by the \
-                   interpolated map against what they give directly in the refined field, at places \
-                   of the surface that are neither nodes nor points, relative to the force to be \
-                   felt there; the largest"
+                   interpolated map against what they give directly in the refined field, relative \
+                   to the force to be felt there; the largest of places of the surface all over the \
+                   maps' cells and up to its rim, times 1.25 for what lies between them"
             .to_owned(),
         timed: "processor time of all threads: steel, points, forces with all force constants, and \
                 the part of the map that the object needs; the median where short enough to repeat"

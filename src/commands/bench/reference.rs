@@ -2,13 +2,14 @@
 
 use super::clock::Watch;
 use super::ladder::Ladders;
+use super::places::{Chosen, choose};
 use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
 use crate::commands::lambda::ForcesAt;
 use crate::lambda::{self, ForceProblem, Solution, Wiring};
 use crate::map::FieldMap;
-use crate::numerics::axis::Axis;
+use crate::map::interpolation::SAFETY;
 use crate::progress::Silent;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -16,8 +17,6 @@ use crate::scene::felt_force::by_map;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::shape::Surface;
-use crate::shape::height::Grid as Plan;
 
 /// Tolerance of the refined field in air: the kernel's own rounding.
 const AIR: f64 = 1e-15;
@@ -25,10 +24,6 @@ const AIR: f64 = 1e-15;
 const STEEL: f64 = 0.1;
 /// The tightest tolerance requested of steel.
 const TIGHTEST_STEEL: f64 = 1e-9;
-/// Places compared along x and y. With these margins, parts of the plan's width that no grid of equal
-/// steps has, none of them is a node of the map or a point.
-const PLACES: [usize; 2] = [19, 17];
-const MARGINS: [f64; 2] = [0.0371, 0.0293];
 
 /// Where the felt force is compared, and the refined field there.
 pub struct Places {
@@ -38,6 +33,7 @@ pub struct Places {
     moment_a_m2: [f64; 3],
     coils: usize,
     shape: String,
+    out_of_reach: usize,
 }
 
 /// The refined run.
@@ -139,13 +135,17 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
             progress: &bench.within(),
         },
     )?;
-    let position_m = places(shape, ladders, bench)?;
+    let Chosen {
+        position_m,
+        out_of_reach,
+    } = choose(shape, ladders, bench)?;
     let places = Places {
         forces_n_per_a: scene.forces_n_per_a(&solved, &position_m, &bench.within())?,
         position_m,
         moment_a_m2: scene.moment_a_m2,
         coils: scene.coils.len(),
         shape: shape.document.name.clone(),
+        out_of_reach,
     };
     bench.advance();
     Ok(Refined {
@@ -168,10 +168,14 @@ impl Refined {
         } else {
             "the field to a tenth of the present tolerance"
         };
+        let left_out = match self.places.out_of_reach {
+            0 => String::new(),
+            more => format!("; {more} places that no map reaches are left out"),
+        };
         Reference {
             how: format!(
                 "{field}; points twice as fine along each axis as the finest of the sweep, weighted by \
-                 the area they stand for; the felt force without a map, computed at the places directly"
+                 the area they stand for; the felt force without a map, computed at the places directly{left_out}"
             ),
             tolerance: self.tolerance,
             points: self.points as u64,
@@ -183,50 +187,9 @@ impl Refined {
     }
 }
 
-/// Places of the surface that are neither nodes nor points.
-fn places(
-    shape: &ShapeSource,
-    ladders: &Ladders,
-    bench: &Bench,
-) -> Result<Vec<[f64; 3]>, RunError> {
-    let grid = ladders.points_present.grid;
-    let within = |axis: Axis, samples: usize| {
-        let width = axis.to - axis.from;
-        Axis {
-            from: axis.from + MARGINS[0] * width,
-            to: axis.to - MARGINS[1] * width,
-            samples,
-        }
-    };
-    let plan = Plan {
-        x_m: within(grid.x_m, PLACES[0]),
-        y_m: within(grid.y_m, PLACES[1]),
-    };
-    let fault = |source| RunError::Shape {
-        name: shape.document.name.clone(),
-        source,
-    };
-    let (surface, _) = Surface::open(&shape.document, &Silent).map_err(fault)?;
-    let heights = surface.heights(&plan, &bench.within()).map_err(fault)?;
-    let seen = heights.iter().enumerate().filter_map(|(k, sample)| {
-        let z = sample.as_ref()?.height_m;
-        let (i, j) = (k % PLACES[0], k / PLACES[0]);
-        (z > 0.0).then(|| [plan.x_m.node(i), plan.y_m.node(j), z])
-    });
-    let places: Vec<[f64; 3]> = seen.collect();
-    if places.is_empty() {
-        return Err(RunError::Input(format!(
-            "shape {:?} has no surface at any of {} places between its points; make it wider",
-            shape.document.name,
-            PLACES[0] * PLACES[1]
-        )));
-    }
-    Ok(places)
-}
-
 impl Places {
-    /// Largest |force by the map - force directly| of the same currents, relative to the force that
-    /// is to be felt, lambda h.
+    /// Largest |force by the map - force directly| of the same currents at the places, relative to the force that
+    /// is to be felt, lambda h, times the factor that stands for what lies between them.
     ///
     /// # Errors
     /// A place outside the map.
@@ -254,6 +217,6 @@ impl Places {
             let target = lambda_n_per_m * place[2];
             largest = largest.max((difference / target).abs());
         }
-        Ok(largest)
+        Ok(SAFETY * largest)
     }
 }
