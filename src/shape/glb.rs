@@ -4,6 +4,7 @@
 //! file's length. Read are meshes of triangles, strips and fans; z is made to point upwards.
 
 mod extensions;
+mod held;
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::Root;
@@ -150,47 +151,20 @@ fn children(node: &Node<'_>, meshes: usize) -> Vec<(usize, Affine)> {
     own.into_iter().chain(nodes).collect()
 }
 
-fn missing() -> String {
-    "the GLB file holds a mesh whose data are missing, compressed or in another \
-     file: save it again as one file without compression (Draco, meshopt)"
-        .to_owned()
-}
-
-/// Checks that an accessor's numbers lie within the file.
-fn check_held(accessor: &gltf::Accessor<'_>, blob: &[u8]) -> Result<(), String> {
-    let held = || {
-        let view = accessor.view()?;
-        let in_file = matches!(view.buffer().source(), gltf::buffer::Source::Bin);
-        let end = view.offset().checked_add(view.length())?;
-        let stride = view.stride().unwrap_or(accessor.size());
-        let last = accessor.count().checked_sub(1)?.checked_mul(stride)?;
-        let reach = accessor
-            .offset()
-            .checked_add(last)?
-            .checked_add(accessor.size())?;
-        (in_file && end <= blob.len() && reach <= view.length() && stride >= accessor.size())
-            .then_some(())
-    };
-    held().ok_or_else(missing)
-}
-
 /// A primitive's points and the indices of its corners.
 fn points_and_indices(
     primitive: &gltf::Primitive<'_>,
     blob: &[u8],
 ) -> Result<(Vec<[f64; 3]>, Vec<u32>), String> {
-    let positions = primitive.get(&Semantic::Positions).ok_or_else(missing)?;
-    check_held(&positions, blob)?;
+    let positions = primitive.get(&Semantic::Positions).ok_or_else(held::missing)?;
+    held::check(&positions, blob)?;
     if (positions.data_type(), positions.dimensions()) != (DataType::F32, Dimensions::Vec3) {
         return Err("the GLB file holds positions that are not three floats each".into());
-    }
-    if positions.sparse().is_some() || primitive.indices().is_some_and(|i| i.sparse().is_some()) {
-        return Err("the GLB file holds sparse data, which are not read".into());
     }
     let reader = primitive.reader(|_| Some(blob));
     let points: Vec<[f64; 3]> = reader
         .read_positions()
-        .ok_or_else(missing)?
+        .ok_or_else(held::missing)?
         .map(|p| p.map(f64::from))
         .collect();
     if points.as_flattened().iter().any(|c| !c.is_finite()) {
@@ -200,7 +174,7 @@ fn points_and_indices(
         let in_order = (0..points.len() as u32).collect();
         return Ok((points, in_order));
     };
-    check_held(&accessor, blob)?;
+    held::check(&accessor, blob)?;
     let whole = matches!(
         accessor.data_type(),
         DataType::U8 | DataType::U16 | DataType::U32
@@ -208,7 +182,7 @@ fn points_and_indices(
     if !whole || accessor.dimensions() != Dimensions::Scalar {
         return Err("the GLB file holds indices that are not whole numbers".into());
     }
-    let indices = reader.read_indices().ok_or_else(missing)?;
+    let indices = reader.read_indices().ok_or_else(held::missing)?;
     Ok((points, indices.into_u32().collect()))
 }
 

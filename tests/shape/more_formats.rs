@@ -300,6 +300,16 @@ fn glb_with(from: &str, to: &str) -> Vec<u8> {
     whole
 }
 
+/// Sparse positions without a view were taken for compressed ones.
+#[test]
+fn sparse_data_of_glb_are_named_as_what_they_are() {
+    let sparse = "{\"componentType\":5126,\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":1,\
+                  \"componentType\":5123},\"values\":{\"bufferView\":0}},\"count\":4,";
+    let plain = "{\"bufferView\":0,\"componentType\":5126,\"count\":4,";
+    let message = refusal(SurfaceFormat::Glb, &glb_with(plain, sparse));
+    assert!(message.contains("sparse"), "{message}");
+}
+
 /// Every required extension was called damage, the harmless ones too.
 #[test]
 fn required_extensions_of_glb_are_passed_or_named_with_advice() {
