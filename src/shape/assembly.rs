@@ -55,7 +55,7 @@ impl Affine {
     }
 
     /// The magnitudes of its numbers.
-    fn magnitudes(&self) -> Self {
+    pub(super) fn magnitudes(&self) -> Self {
         Self {
             rows: self.rows.map(|row| row.map(f64::abs)),
             shift: self.shift.map(f64::abs),

@@ -5,6 +5,7 @@
 
 mod extensions;
 mod held;
+mod skins;
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::Root;
@@ -72,18 +73,18 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     bodies.resize(meshes + file.nodes().len(), Body::default());
     for node in file.nodes() {
         bodies[meshes + node.index()].children = children(&node, meshes);
-        if node.skin().is_some() {
-            let what = "the file bends meshes by skins; they are read as they are at rest";
-            warnings.push(what.to_owned());
-        }
     }
-    warnings.dedup();
     let scene = file.default_scene().or_else(|| file.scenes().next());
     let scene = scene.ok_or_else(|| ReadError::file("the GLB file shows no scene"))?;
-    let roots: Vec<(usize, Affine)> = scene
+    let mut roots: Vec<(usize, Affine)> = scene
         .nodes()
         .map(|node| (meshes + node.index(), UPWARDS))
         .collect();
+    let skinned = skins::add((&file, blob), (&scene, UPWARDS), &mut bodies, &mut roots);
+    if skinned.map_err(ReadError::file)? {
+        let what = "the file bends meshes by skins; they are read as they are at rest";
+        warnings.push(what.to_owned());
+    }
     let laid_out = lay_out(&bodies, &roots, Fineness::Floats).map_err(ReadError::file)?;
     if laid_out.triangles.is_empty() {
         let what = "the GLB file's scene holds no triangle: export a body as a mesh";
@@ -138,15 +139,11 @@ fn chunks(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     Some((json, blob))
 }
 
-/// A node's mesh and nodes, placed by its own transformation.
+/// A node's mesh and nodes, placed by its own transformation, which a skinned mesh does not follow.
 fn children(node: &Node<'_>, meshes: usize) -> Vec<(usize, Affine)> {
-    let m = node
-        .transform()
-        .matrix()
-        .map(|column| column.map(f64::from));
-    let columns: Vec<f64> = m.iter().flat_map(|column| column[..3].to_vec()).collect();
-    let place = Affine::from_columns(columns.try_into().unwrap_or([0.0; 12]));
-    let own = node.mesh().map(|mesh| (mesh.index(), place));
+    let place = skins::affine(node.transform().matrix());
+    let stiff = node.mesh().filter(|_| node.skin().is_none());
+    let own = stiff.map(|mesh| (mesh.index(), place));
     let nodes = node.children().map(|child| (meshes + child.index(), place));
     own.into_iter().chain(nodes).collect()
 }
@@ -156,7 +153,9 @@ fn points_and_indices(
     primitive: &gltf::Primitive<'_>,
     blob: &[u8],
 ) -> Result<(Vec<[f64; 3]>, Vec<u32>), String> {
-    let positions = primitive.get(&Semantic::Positions).ok_or_else(held::missing)?;
+    let positions = primitive
+        .get(&Semantic::Positions)
+        .ok_or_else(held::missing)?;
     held::check(&positions, blob)?;
     if (positions.data_type(), positions.dimensions()) != (DataType::F32, Dimensions::Vec3) {
         return Err("the GLB file holds positions that are not three floats each".into());

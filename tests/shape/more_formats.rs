@@ -284,20 +284,91 @@ fn coarse_grey_levels_leave_the_plan_of_an_image_alone() {
 
 /// The sample file with a part of its document replaced.
 fn glb_with(from: &str, to: &str) -> Vec<u8> {
+    glb_of(&[(from, to)], &[])
+}
+
+/// The sample file with parts of its document replaced and `more` behind its 72 bytes of data.
+fn glb_of(edits: &[(&str, &str)], more: &[f32]) -> Vec<u8> {
     let bytes = glb();
     let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-    let json = std::str::from_utf8(&bytes[20..20 + length]).unwrap();
-    assert!(json.contains(from), "{from}");
-    let mut json = json.replacen(from, to, 1).into_bytes();
+    let mut json = String::from_utf8(bytes[20..20 + length].to_vec()).unwrap();
+    for (from, to) in edits {
+        assert!(json.contains(from), "{from}");
+        json = json.replacen(from, to, 1);
+    }
+    let mut json = json.into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
-    let rest = &bytes[20 + length..];
+    let mut blob = bytes[20 + length + 8..].to_vec();
+    blob.extend(more.iter().flat_map(|number| number.to_le_bytes()));
     let mut whole = b"glTF\x02\0\0\0".to_vec();
-    whole.extend((20 + json.len() as u32 + rest.len() as u32).to_le_bytes());
-    whole.extend((json.len() as u32).to_le_bytes());
-    whole.extend(b"JSON");
-    whole.extend(json);
-    whole.extend(rest);
+    whole.extend((28 + json.len() as u32 + blob.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &blob)] {
+        whole.extend((chunk.len() as u32).to_le_bytes());
+        whole.extend(kind);
+        whole.extend(chunk);
+    }
     whole
+}
+
+/// The sample with its mesh bound to two joints below a node 1 m up; the joints' own keys and their inverse bind
+/// matrices, of a scale and a shift along y.
+fn skinned(joints: [&str; 2], binds: [[f32; 2]; 2]) -> Vec<u8> {
+    let [a, b] = joints;
+    let nodes = format!(
+        "\"skins\":[{{\"joints\":[2,3],\"inverseBindMatrices\":3}}],\
+         \"nodes\":[{{\"children\":[1,2,3],\"translation\":[0,1,0]}},\
+         {{\"mesh\":0,\"skin\":0,\"translation\":[5,7,9]}},{{{a}}},{{{b}}}],"
+    );
+    let matrix = |[scale, y]: [f32; 2]| {
+        let mut columns = [0.0; 16];
+        (columns[0], columns[5], columns[10]) = (scale, scale, scale);
+        (columns[13], columns[15]) = (y, 1.0);
+        columns
+    };
+    let edits = [
+        (
+            "\"nodes\":[{\"children\":[1]},{\"mesh\":0,\"scale\":[2,2,2]}],",
+            nodes.as_str(),
+        ),
+        ("\"byteLength\":72}", "\"byteLength\":200}"),
+        (
+            "\"byteLength\":24}]",
+            "\"byteLength\":24},{\"buffer\":0,\"byteOffset\":72,\"byteLength\":128}]",
+        ),
+        (
+            "\"count\":3,\"type\":\"SCALAR\"}]",
+            "\"count\":3,\"type\":\"SCALAR\"},\
+             {\"bufferView\":2,\"componentType\":5126,\"count\":2,\"type\":\"MAT4\"}]",
+        ),
+    ];
+    glb_of(&edits, binds.map(matrix).as_flattened())
+}
+
+/// Skinned meshes were placed by their own node, which glTF ignores, and not by their joints.
+#[test]
+fn skinned_meshes_are_placed_by_their_joints_or_refused_where_these_bend_them() {
+    let plain = read(SurfaceFormat::Glb, &glb()).unwrap();
+    // One is written otherwise: 2 (y + 0.3) - 0.6 = 2 y.
+    let joints = ["\"scale\":[2,2,2]", "\"translation\":[0,-0.6,0]"];
+    let file = read(
+        SurfaceFormat::Glb,
+        &skinned(joints, [[1.0, 0.0], [2.0, 0.6]]),
+    );
+    let file = file.unwrap();
+    assert!(file.warnings[0].contains("skins"), "{:?}", file.warnings);
+    assert_eq!(file.triangles.len(), plain.triangles.len());
+    let corners = file.triangles.as_flattened().iter();
+    for (placed, own) in corners.zip(plain.triangles.as_flattened()) {
+        for (at, own) in placed.iter().zip([own[0], own[1], own[2] + 1.0]) {
+            assert!((at - own).abs() < 1e-6, "{placed:?}");
+        }
+    }
+    let bent = skinned(joints, [[1.0, 0.0], [2.0, 0.61]]);
+    let message = refusal(SurfaceFormat::Glb, &bent);
+    assert!(
+        message.contains("skin") && message.contains("apply it and export it again"),
+        "{message}"
+    );
 }
 
 /// Sparse positions without a view were taken for compressed ones.
