@@ -249,7 +249,8 @@ impl FileSet {
         let mut dirs: Vec<Dir> = Vec::new();
         for file in self.staged.into_iter().rev() {
             let placed = match file.permit {
-                Permit::Same => continue,
+                // Its folder counts all the same: a killed run's leftovers may be there.
+                Permit::Same => Ok(()),
                 Permit::New => file.temporary.persist_new(&file.name),
                 Permit::Replace => file.temporary.persist(&file.name),
             };
@@ -464,6 +465,16 @@ mod tests {
         put_both(folder.path(), "plate.csv", "22", false).unwrap_err();
         std::fs::write(ReplacedNote::path(&sidecar), note.bytes().unwrap()).unwrap();
         put_both(folder.path(), "plate.csv", "22", false).unwrap();
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    /// They stayed for good where the next run changed nothing.
+    #[test]
+    fn what_a_killed_run_left_goes_also_where_nothing_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::write(folder.path().join(".fluxform-0.tmp"), "").unwrap();
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
         assert_eq!(folder.path().read_dir().unwrap().count(), 2);
     }
 
