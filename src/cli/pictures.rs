@@ -3,6 +3,7 @@
 //! Nothing lists such a file with its digest. One that is there is replaced with `--force`; a run that
 //! makes the same bytes again leaves it.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use super::documents::DesignDocument;
@@ -11,7 +12,7 @@ use super::printer::{Printer, Stream};
 use super::values::FileArgument;
 use crate::RunError;
 use crate::bundle::artefact::Input;
-use crate::bundle::atomic::{self, Overwrite, check_distinct, write};
+use crate::bundle::atomic::{self, FileSet, Overwrite, check_distinct, write};
 use crate::design::message_text::shown_path;
 use crate::plot::drawing::{Drawing, DrawingFormat};
 
@@ -48,6 +49,27 @@ pub fn checked<'a, const COUNT: usize>(
         picture.check(std::slice::from_ref(&document.input))?;
     }
     Ok(pictures)
+}
+
+/// What a file holds: the line that states what it was made of, where it is a text, and the rest.
+struct Content {
+    mark: String,
+    bytes: Vec<u8>,
+}
+
+impl Content {
+    fn of_text(inputs: &[Input], text: &str) -> Self {
+        let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
+        Self {
+            mark: format!("{MARK}{} -->\n", digests.join(" ")),
+            bytes: text.into(),
+        }
+    }
+
+    fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(self.mark.as_bytes())?;
+        out.write_all(&self.bytes)
+    }
 }
 
 /// A drawing or a page that a run is to make, and what of its files it must not replace.
@@ -103,13 +125,23 @@ impl<'a> Picture<'a> {
         drawing: &Drawing,
         printer: &Printer,
     ) -> Result<Stream, Failure> {
-        match self.format() {
-            DrawingFormat::Svg => self.write(inputs, &drawing.svg(), printer),
-            format => {
-                let bytes = drawing.bytes(format).map_err(Failure::Input)?;
-                self.write_marked("", inputs, &bytes, printer)
-            }
-        }
+        let content = self.drawn(inputs, drawing)?;
+        self.put(inputs, &content, printer)
+    }
+
+    /// As [`Self::draw`], the file one of `set`, which puts it in place.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn draw_into(
+        &self,
+        set: &mut FileSet,
+        inputs: &[Input],
+        drawing: &Drawing,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        let content = self.drawn(inputs, drawing)?;
+        self.put_into(set, inputs, &content, printer)
     }
 
     /// Writes a text, whole or not at all. Returns where a summary may still go.
@@ -122,32 +154,79 @@ impl<'a> Picture<'a> {
         text: &str,
         printer: &Printer,
     ) -> Result<Stream, Failure> {
-        let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
-        let mark = format!("{MARK}{} -->\n", digests.join(" "));
-        self.write_marked(&mark, inputs, text.as_bytes(), printer)
+        self.put(inputs, &Content::of_text(inputs, text), printer)
     }
 
-    fn write_marked(
+    /// As [`Self::write`], the file one of `set`, which puts it in place.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn write_into(
         &self,
-        mark: &str,
+        set: &mut FileSet,
         inputs: &[Input],
-        content: &[u8],
+        text: &str,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        self.put_into(set, inputs, &Content::of_text(inputs, text), printer)
+    }
+
+    fn drawn(&self, inputs: &[Input], drawing: &Drawing) -> Result<Content, Failure> {
+        Ok(match self.format() {
+            DrawingFormat::Svg => Content::of_text(inputs, &drawing.svg()),
+            format => Content {
+                mark: String::new(),
+                bytes: drawing.bytes(format).map_err(Failure::Input)?,
+            },
+        })
+    }
+
+    fn put(
+        &self,
+        inputs: &[Input],
+        content: &Content,
         printer: &Printer,
     ) -> Result<Stream, Failure> {
         let path = match self.file {
             FileArgument::Standard => {
-                printer.data(|out| out.write_all(content))?;
+                printer.data(|out| out.write_all(&content.bytes))?;
                 return Ok(Stream::Error);
             }
             FileArgument::Path(path) => path,
         };
-        write(path, &self.overwrite(mark, inputs), |out| {
-            out.write_all(mark.as_bytes())?;
-            out.write_all(content)
+        write(path, &self.overwrite(&content.mark, inputs), |out| {
+            content.write(out)
         })
         .map_err(RunError::from)?;
         printer.notice(&format!("written: {}", shown_path(path)));
         Ok(Stream::Output)
+    }
+
+    fn put_into(
+        &self,
+        set: &mut FileSet,
+        inputs: &[Input],
+        content: &Content,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        match self.file {
+            FileArgument::Path(path) if !atomic::is_stream(path) => {
+                let overwrite = self.overwrite(&content.mark, inputs);
+                set.write_under(path, overwrite, Box::new(|out| content.write(out)))
+                    .map_err(RunError::from)?;
+                Ok(Stream::Output)
+            }
+            FileArgument::Standard | FileArgument::Path(_) => self.put(inputs, content, printer),
+        }
+    }
+
+    /// Says that its file is in place; of a stream that was said as it was written to.
+    pub fn is_written(&self, printer: &Printer) {
+        if let FileArgument::Path(path) = self.file
+            && !atomic::is_stream(path)
+        {
+            printer.notice(&format!("written: {}", shown_path(path)));
+        }
     }
 
     /// By the file's ending; pages, which have their own, are texts as SVG is.

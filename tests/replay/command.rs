@@ -222,3 +222,20 @@ fn a_bundle_that_is_not_whole_or_has_no_force_constant_is_refused() {
         .ends(4)
         .says(&["has no force constant (lambda is null)"]);
 }
+
+/// Regression: the picture and the page were put in place before the table, so that a disk that was full then left
+/// them alone, and the same run was refused because of them.
+#[test]
+fn picture_and_page_are_there_with_the_table_or_not_at_all() {
+    let place = with_a_bundle();
+    place.write("finger.csv", FINGER);
+    replay(&place, "flat finger.csv --plot r.svg --report /dev/full").ends(4);
+    for name in ["r.svg", "replay.csv", "replay.json"] {
+        assert!(!place.path(name).exists(), "{name}");
+    }
+    let both = "flat finger.csv --plot r.svg --report pages/r.html";
+    let ran = replay(&place, both).ends(0);
+    let ran = ran.says(&["written: r.svg", "written: pages/r.html"]);
+    assert!(ran.out.contains("replay.csv"), "{}", ran.out);
+    assert!(place.path("r.svg").is_file() && place.path("pages/r.html").is_file());
+}

@@ -21,7 +21,7 @@ pub struct Written {
 }
 
 /// What writes a file's bytes. Boxed, so that what makes a file is compiled once and not for every content.
-pub(super) type Content<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
+pub type Content<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
 
 /// Whether what is written must be on the disk before it counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

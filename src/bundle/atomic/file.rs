@@ -157,11 +157,11 @@ impl FileSet {
         self.write_under(target, self.overwrite.clone(), Box::new(content))
     }
 
-    /// As [`Self::write_at`], replaced under a policy of its own.
+    /// Stages a file of any path, its folder made where needed, replaced under a policy of its own.
     ///
     /// # Errors
-    /// As [`Self::write_at`].
-    pub(crate) fn write_under(
+    /// [`WriteError`]; nothing is left of it.
+    pub fn write_under(
         &mut self,
         target: &Path,
         overwrite: Overwrite,

@@ -6,14 +6,15 @@ use clap::Args;
 
 use super::output::{ReplayFiles, write_trajectory};
 use super::page;
+use super::page::Below;
 use super::summary::TrajectorySource;
 use super::synthesize;
 use super::synthesize::{Kind, Synthesis};
 use super::text;
-use super::{Opened, run};
+use super::{Opened, ReplayReport, run};
 use crate::RunError;
 use crate::bundle::artefact::Input;
-use crate::bundle::atomic::{Overwrite, check_distinct};
+use crate::bundle::atomic::{FileSet, Overwrite, check_distinct};
 use crate::bundle::trajectory::Trajectory;
 use crate::cli::args::Writing;
 use crate::cli::documents;
@@ -174,26 +175,13 @@ impl Replay {
         for warning in &report.summary.warnings {
             printer.warning(warning);
         }
-        let mut drawn = match &plot {
-            Some(plot) => plot.draw(&inputs, &report.drawing(), printer)?,
-            None => Stream::Output,
-        };
-        if let Some(page) = &page {
-            let written = page.write(&inputs, &page::html(&report, &opened.below()), printer)?;
-            if written == Stream::Error {
-                drawn = written;
-            }
-        }
-        let place = match (&files, &overwrite) {
-            (Some(files), Some(overwrite)) => {
-                report.write(files, overwrite)?;
-                drawn
-            }
-            (None, _) | (_, None) => {
-                printer.data(|out| report.rows.write(out))?;
-                Stream::Error
-            }
-        };
+        let place = write(
+            &mut report,
+            files.as_ref().zip(overwrite),
+            [&plot, &page].map(Option::as_ref),
+            (&inputs, &opened.below()),
+            printer,
+        )?;
         report.summary.warnings = printer.warnings();
         let written = files.as_ref().map(|files| written(files, self.beside()));
         printer.summary(place, &report.summary, || {
@@ -281,6 +269,43 @@ impl Replay {
         };
         Some((synthesis, name))
     }
+}
+
+/// Writes the table with what is beside it, picture and page, all or none: a full disk leaves no page without
+/// its table. Without files the table goes to standard output. Returns where a summary may still go.
+fn write(
+    report: &mut ReplayReport,
+    files: Option<(&ReplayFiles, Overwrite)>,
+    [plot, page]: [Option<&Picture>; 2],
+    (inputs, below): (&[Input], &Below),
+    printer: &Printer,
+) -> Result<Stream, Failure> {
+    let Some((files, overwrite)) = files else {
+        if let Some(plot) = plot {
+            plot.draw(inputs, &report.drawing(), printer)?;
+        }
+        if let Some(page) = page {
+            page.write(inputs, &page::html(report, below), printer)?;
+        }
+        printer.data(|out| report.rows.write(out))?;
+        return Ok(Stream::Error);
+    };
+    let mut set = FileSet::begin(files.folder(), overwrite);
+    let mut place = Stream::Output;
+    if let Some(plot) = plot {
+        place = place.or(plot.draw_into(&mut set, inputs, &report.drawing(), printer)?);
+    }
+    if let Some(page) = page {
+        let html = page::html(report, below);
+        place = place.or(page.write_into(&mut set, inputs, &html, printer)?);
+    }
+    // The facts last: they are in place first and list the table.
+    report.stage(files, &mut set)?;
+    set.commit().map_err(RunError::from)?;
+    for picture in [plot, page].into_iter().flatten() {
+        picture.is_written(printer);
+    }
+    Ok(place)
 }
 
 /// Folder and names of what was written, for people.

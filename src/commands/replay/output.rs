@@ -88,11 +88,11 @@ impl ReplayFiles {
 }
 
 impl ReplayReport {
-    /// Writes table, facts and seconds, all or none.
+    /// Adds table, facts and seconds to `set`, which begins in the files' folder.
     ///
     /// # Errors
     /// [`RunError::Write`].
-    pub fn write(&mut self, files: &ReplayFiles, overwrite: &Overwrite) -> Result<(), RunError> {
+    pub fn stage(&mut self, files: &ReplayFiles, set: &mut FileSet) -> Result<(), RunError> {
         let timing = ReplayTiming {
             positions: self.rows.len(),
             seconds_per_step: self.step_s,
@@ -105,7 +105,6 @@ impl ReplayReport {
                 })
                 .collect(),
         };
-        let mut set = FileSet::begin(&files.folder, overwrite.clone());
         let table = set.write(&files.table, |out| self.rows.write(out))?;
         self.summary.files = vec![FileEntry::new(&files.table, table)];
         set.write(&files.timing, |out| {
@@ -114,7 +113,7 @@ impl ReplayReport {
         set.write(&files.facts, |out| {
             out.write_all(&to_record(&self.summary).map_err(io::Error::other)?)
         })?;
-        Ok(set.commit()?)
+        Ok(())
     }
 
     /// The picture.
