@@ -1,5 +1,7 @@
 //! A bundle says some things twice: for people, for C programs, for spreadsheets. They must agree.
 
+use serde::Serialize;
+
 use super::array_check::LARGEST;
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
@@ -210,8 +212,18 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
             .abs()
             .max((found.to_m - axis.to_m).abs());
         if found.samples != axis.samples || ends > near {
+            let words = |axis: AxisSummary| {
+                let AxisSummary {
+                    from_m,
+                    to_m,
+                    samples,
+                } = axis;
+                format!("from {from_m} to {to_m} with {samples} samples")
+            };
             return Err(format!(
-                "map.npz has {name} {found:?}, the manifest {axis:?}"
+                "map.npz has {name} {}, the manifest {}",
+                words(found),
+                words(axis)
             ));
         }
     }
@@ -281,14 +293,34 @@ fn check_points(manifest: &Manifest, points: &[PointRow]) -> Result<(), String> 
     Ok(())
 }
 
-fn same<T: PartialEq + std::fmt::Debug>(rule: &str, found: T, want: T) -> Result<(), String> {
+fn same<T: PartialEq + Serialize>(rule: &str, found: T, want: T) -> Result<(), String> {
     if found == want {
         return Ok(());
     }
-    let short = |value: &T| format!("{value:?}").chars().take(120).collect::<String>();
+    let short = |value: &T| match serde_json::to_string(value).as_deref() {
+        Ok("null") | Err(_) => "nothing".to_owned(),
+        Ok(text) => text.chars().take(120).collect(),
+    };
     Err(format!(
         "expected that {rule}; found {} and {}",
         short(&found),
         short(&want)
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::same;
+
+    #[test]
+    fn contradictions_are_stated_in_values() {
+        let found = |found: Option<f64>, want| same("both agree", found, want).unwrap_err();
+        let message = found(Some(0.137), None);
+        assert_eq!(message, "expected that both agree; found 0.137 and nothing");
+        let list = same("both agree", [0.5, 3.0], [0.5, -1e-7]).unwrap_err();
+        assert_eq!(
+            list,
+            "expected that both agree; found [0.5,3.0] and [0.5,-1e-7]"
+        );
+    }
 }
