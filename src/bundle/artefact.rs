@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,6 +42,21 @@ impl Input {
             sha256: sha256_hex(bytes),
         }
     }
+}
+
+/// Longer names are none.
+pub(crate) const NAME_BYTES: usize = 4096;
+
+/// Whether a record may hold this name of a design, a shape or an input: names are printed for people and on
+/// terminals.
+pub(crate) fn is_name(name: &str) -> bool {
+    name.len() <= NAME_BYTES && !name.chars().any(char::is_control)
+}
+
+/// Whether an input at `path` can be named in a record and found again by that name.
+#[must_use]
+pub fn is_nameable(path: &Path) -> bool {
+    path.to_str().is_some_and(is_name)
 }
 
 /// The digest of an input whose bytes arrive in pieces.

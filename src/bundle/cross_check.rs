@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::array_check::LARGEST;
+use super::artefact::{NAME_BYTES, is_name};
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
 use super::npz::{MapArrays, PASSIVE, SIDES};
@@ -12,8 +13,6 @@ use super::table::{CurrentRow, PointRow};
 /// Points and axes' ends may differ by this from what the manifest says, relative to the largest
 /// coordinate: the files hold the numbers themselves.
 const ON_GRID: f64 = 1e-9;
-/// Longer names are none.
-const NAME_BYTES: usize = 4096;
 
 /// Checks a bundle's parts against each other.
 ///
@@ -126,7 +125,7 @@ fn check_names(manifest: &Manifest) -> Result<(), String> {
     ];
     let paths = manifest.inputs.iter().map(|input| ("inputs", &input.path));
     for (key, name) in names.into_iter().chain(paths) {
-        if name.len() > NAME_BYTES || name.chars().any(char::is_control) {
+        if !is_name(name) {
             let shown: String = name.chars().take(40).collect();
             return Err(format!(
                 "{key} must be a name of at most {NAME_BYTES} bytes without control characters, \

@@ -2,6 +2,7 @@
 
 use crate::SEED;
 use fluxform_testing::place::Place;
+use fluxform_testing::run::Ran;
 
 #[test]
 fn what_is_not_ours_is_replaced_only_with_force() {
@@ -469,5 +470,23 @@ fn of_two_runs_at_once_with_other_options_one_is_refused() {
             .map(|child| child.wait_with_output().unwrap().status.code());
         codes.sort();
         assert_eq!(codes, [Some(0), Some(4)]);
+    }
+}
+
+/// Regression: a bundle named such an input so that `verify` did not find it, or was refused only as it was written.
+#[test]
+#[cfg(unix)]
+fn inputs_that_a_bundle_cannot_name_are_refused_before_anything_is_computed() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let place = Place::new();
+    let shape = place.text("shapes/flat.toml");
+    let names: [&[u8]; 2] = [b"a\xff.toml", b"a\nb.toml"];
+    for name in names.map(OsStr::from_bytes) {
+        std::fs::write(place.root().join(name), &shape).unwrap();
+        let ran = place.command(&["calibrate", SEED]).arg(name).output();
+        let ran = Ran::of(ran.unwrap()).ends(3);
+        ran.says(&["a bundle names its inputs", "rename the file"]);
+        assert!(!place.path("results/seed_air").exists());
     }
 }

@@ -10,11 +10,12 @@ use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::text::summary;
 use super::{run, run_shard};
+use crate::bundle::artefact::is_nameable;
 use crate::cli::args::{
     ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, UncertaintyFlags, WeightsFlag, Writing,
 };
 use crate::cli::budget::{CostOrigin, allow, cost_origin};
-use crate::cli::documents;
+use crate::cli::documents::{self, DesignDocument};
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
@@ -27,11 +28,13 @@ use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{AtFlag, CriterionFlags, costs_of, rendered, well_placed};
 use crate::design::Need;
+use crate::design::message_text::shown_path;
 use crate::scene::cached_field::SteelPart;
 use crate::scene::cost::{Components, of_map, of_steel};
 use crate::scene::shard::Shard;
-use crate::scene::sources::DesignSource;
+use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::tolerances::ErrorTarget;
+use crate::shape::document::SurfaceSource;
 
 /// The main job: maps, points, force constant and currents, one bundle per shape
 ///
@@ -142,6 +145,7 @@ impl Calibrate {
             &self.surface,
             printer,
         )?;
+        self.nameable(&document, &shapes)?;
         lambda.check_force(shapes.iter().map(|shape| &shape.document))?;
         let design = &document.design;
         let source = DesignSource {
@@ -201,6 +205,29 @@ impl Calibrate {
             .map(|b| (b.manifest.shape.as_str(), b.lambda.file.lambda_n_per_m))
             .collect();
         rendered(&constants)
+    }
+}
+
+impl Calibrate {
+    /// Refuses files that a bundle could not name among its inputs, so that `verify` would not find them.
+    fn nameable(&self, document: &DesignDocument, shapes: &[ShapeSource]) -> Result<(), Failure> {
+        let given = std::iter::once(&self.design).chain(&self.shapes);
+        let given = given.map(|file| file.as_given().to_path_buf());
+        let surfaces = shapes
+            .iter()
+            .filter_map(|shape| match &shape.document.source {
+                SurfaceSource::File { path, .. } => Some(path.clone()),
+                SurfaceSource::Primitive(_) => None,
+            });
+        let mut all = given.chain(document.also_read()).chain(surfaces);
+        match all.find(|path| !is_nameable(path)) {
+            None => Ok(()),
+            Some(path) => Err(Failure::Input(format!(
+                "{}: a bundle names its inputs, which takes a path in UTF-8 of at most 4096 bytes without \
+                 line breaks and other control characters; rename the file or its folder",
+                shown_path(&path)
+            ))),
+        }
     }
 }
 
