@@ -21,6 +21,7 @@ use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
 use super::read_bounded::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
 use super::read_table::{read_currents, read_rows};
+use super::seal::{SEAL, is_sealed};
 use super::table::{CurrentRow, PointRow};
 use fluxform_numerics::lagrange::{Cell, locate};
 
@@ -321,6 +322,8 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), Bund
     #[derive(Deserialize)]
     struct Version {
         schema_version: String,
+        /// Absent from manifests of schema 1.3 and before.
+        record_sha256: Option<serde::de::IgnoredAny>,
     }
     let text = match read_plain(path, MANIFEST_MAX_BYTES) {
         Err(error)
@@ -350,6 +353,12 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), Bund
         path: path.to_path_buf(),
         message,
     })?;
+    if version.record_sha256.is_some() && !is_sealed(&text) {
+        return Err(BundleError::Damaged {
+            path: path.to_path_buf(),
+            message: format!("its {SEAL} is not that of its text"),
+        });
+    }
     let manifest: Manifest = serde_json::from_slice(&text).map_err(content)?;
     Ok((manifest, text))
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use fluxform::bundle::artefact::sha256_hex;
 
 use crate::SEED;
+use fluxform_testing::bundle::resealed;
 use fluxform_testing::place::Place;
 
 /// Codes that nothing outside brings about at will: a mistake of the program, a machine that starts
@@ -279,7 +280,10 @@ fn prepared() -> Place {
     assert_ne!(design, wrong);
     place.write("edited/design.toml", &wrong);
     let [old, new] = [&design, &wrong].map(|text| sha256_hex(text.as_bytes()));
-    place.write("edited/manifest.json", &manifest.replace(&old, &new));
+    place.write(
+        "edited/manifest.json",
+        &resealed(&manifest.replace(&old, &new)),
+    );
     let plan = ["sweep", "plan", SEED, "--set", "coil.turns=700,710"];
     place
         .run(&[&plan[..], &["--out", "plan.json"]].concat())

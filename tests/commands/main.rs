@@ -22,6 +22,7 @@ use fluxform::field::components::Components;
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
+use fluxform_testing::bundle::resealed;
 
 fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -130,7 +131,7 @@ fn a_bundle_with_a_wrong_number_fails_its_checks() {
         &Input::of_bytes("", wrong.as_bytes()).sha256,
     );
     #[allow(clippy::disallowed_methods)]
-    std::fs::write(&manifest, forged).expect("writable");
+    std::fs::write(&manifest, resealed(&forged)).expect("writable");
     let report = verify::run(folder, &Silent).expect("opens");
     assert!(!report.passed);
     assert_eq!(failed(&report), ["inputs", "scene"]);
@@ -287,7 +288,7 @@ fn forge(folder: &Path, name: &str, bytes: &[u8]) {
         &Input::of_bytes("", bytes).sha256,
     );
     assert_ne!(reported, forged);
-    std::fs::write(&manifest, forged).expect("writable");
+    std::fs::write(&manifest, resealed(&forged)).expect("writable");
     std::fs::write(folder.join(name), bytes).expect("writable");
 }
 

@@ -198,6 +198,15 @@ fn a_bundle_that_is_not_whole_or_has_no_force_constant_is_refused() {
     std::fs::remove_file(place.path("flat/points.csv")).unwrap();
     replay(&place, asked).ends(5).says(&["it is missing"]);
     place.write("flat/points.csv", &points);
+    // Regression: an accuracy that somebody edited was printed.
+    let manifest = place.text("flat/manifest.json");
+    let edited = manifest.replacen("\"largest_error\": ", "\"largest_error\": 1", 1);
+    assert_ne!(edited, manifest);
+    place.write("flat/manifest.json", &edited);
+    replay(&place, asked)
+        .ends(5)
+        .says(&["manifest.json was changed or damaged", "record_sha256"]);
+    place.write("flat/manifest.json", &manifest);
     edit(&place.path("flat/manifest.json"), |m| {
         m["schema_version"] = "2.0.0".into();
     });

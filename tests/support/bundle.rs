@@ -13,11 +13,18 @@ use fluxform_bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
 use fluxform_bundle::manifest::*;
 use fluxform_bundle::npz::{MapArrays, Runtime, SIDES};
 use fluxform_bundle::rendering::{HeightGrid, Rendering, Requested};
+use fluxform_bundle::seal::sealed;
 use fluxform_bundle::table::{CurrentRow, PointRow};
 use fluxform_bundle::timing::StageSeconds;
 use fluxform_bundle::write::{BundleContent, write_bundle};
 use fluxform_lambda::uncertainty::RobustRuntime;
 use fluxform_numerics::axis::Axis;
+
+/// The text of a record that was changed, its own digest made again.
+pub fn resealed(record: &str) -> Vec<u8> {
+    let (bare, _) = record.rsplit_once(',').unwrap();
+    sealed(format!("{bare}\n}}\n").into_bytes())
+}
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.
 pub struct Sample {
