@@ -99,11 +99,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     bench.check()?;
     let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
     let forces = scene.forces_n_per_a(&solved, &points.positions_m, &bench.within())?;
-    let pull = if scene.design.magnet.passive_force {
-        passive::pull(scene, &points.positions_m, false)?
-    } else {
-        None
-    };
+    let pull = passive::counted(scene, &points.positions_m)?;
     let offset_n = pull.map(|pull| pull.forces_z_n(&points.positions_m));
     let weights = Some(points.areas.clone());
     let all = Rows {
