@@ -476,6 +476,7 @@ fn of_two_runs_at_once_with_other_options_one_is_refused() {
 /// Regression: a bundle named such an input so that `verify` did not find it, or was refused only as it was written.
 #[test]
 #[cfg(unix)]
+#[allow(clippy::disallowed_methods)] // a test's own names
 fn inputs_that_a_bundle_cannot_name_are_refused_before_anything_is_computed() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
