@@ -19,7 +19,6 @@ use super::Document;
 use crate::RunError;
 use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::cli::quantity::{number, percent};
 use crate::coil::array_search::problem::{ArrayProblem, Level, Objective, Physical, Physics, Room};
 use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
 use crate::coil::array_search::study::{Study, study};
@@ -453,12 +452,11 @@ fn past_rendering(
         let error = rendered.merits[0].recip();
         if error > MOSTLY_MISSING {
             warnings.push(format!(
-                "lambda_saturation of {} is {} N/m, where the force is {} off what is requested: it is the last force \
-                 constant at which a current changes, however little of the force is left; --constant jnd makes large \
-                 what is rendered",
+                "lambda_saturation of {} is {lambda_n_per_m:.3e} N/m, where the force is {:.0} % off what is \
+                 requested: it is the last force constant at which a current changes, however little of the force is \
+                 left; --constant jnd makes large what is rendered",
                 shape.document.name,
-                number(*lambda_n_per_m),
-                percent(error)
+                100.0 * error
             ));
         }
     }
