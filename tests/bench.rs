@@ -323,6 +323,20 @@ fn points_graded_to_a_deviation_are_swept_instead() {
     );
 }
 
+/// The coarsest grid of bench's own had no point on the pad, and was called the user's.
+#[test]
+fn a_setting_whose_points_miss_the_object_is_left_out() {
+    let place = place(ARRAY);
+    place.write(
+        "pad.toml",
+        "name = \"pad\"\nprimitive = \"flat\"\nside_mm = 8.0\nheight_mm = 20.0\n[points]\n\
+         x_mm = [-19.0, 19.0, 25]\ny_mm = [-17.0, 17.0, 25]\noutside = \"skip\"\n",
+    );
+    let file = measured(&place, &[&["small.toml", "pad.toml"], &ASKED[2..]].concat());
+    let points = along(&file.shapes[0], KnobName::Points, |run| run.lambda_error);
+    assert!(points.len() == 3, "{points:?}");
+}
+
 #[test]
 fn bad_input_is_refused_before_anything_is_measured() {
     let place = place(ARRAY);

@@ -242,7 +242,9 @@ impl FeltForce {
             .then(|| format!("{}: no bound is given ([uncertainty])", missing.join(", ")));
         let pull = pull_share.map(|share| {
             let percent = share * 100.0;
-            format!("{SIDEWAYS_PULL}: {percent:.1} % of the requested force, root mean square")
+            format!(
+                "{SIDEWAYS_PULL}: about {percent:.1} % of the requested force, root mean square"
+            )
         });
         let expected = study.map_or(exact, promised);
         Self {

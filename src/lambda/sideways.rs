@@ -31,7 +31,7 @@ pub struct Sideways {
     /// reach both give the nearest force.
     pub vector_power_ratio: f64,
     /// Share of the unpowered steel's own sideways pull, which neither the shares above nor feedback
-    /// count; absent where its upward pull is not counted either.
+    /// count, from a hundred points, to about a tenth of itself; absent where its upward pull is not counted either.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pull_share: Option<f64>,
 }

@@ -144,7 +144,7 @@ fn measure(
     );
     announce(total);
     progress.begin("bench", total.computations as u64);
-    let shapes = request.shapes.iter().zip(&planned);
+    let shapes = request.shapes.iter().zip(&mut planned);
     let shapes: Vec<ShapeBench> = shapes
         .map(|(shape, ladders)| measure_shape(&bench, shape, ladders))
         .collect::<Result<_, _>>()?;
@@ -177,7 +177,7 @@ fn measure(
 fn measure_shape(
     bench: &Bench,
     shape: &ShapeSource,
-    ladders: &Ladders,
+    ladders: &mut Ladders,
 ) -> Result<ShapeBench, RunError> {
     let refined = refine(bench, shape, ladders)?;
     let points = bench.all_points(shape, ladders)?;

@@ -20,6 +20,8 @@ const PER_HEIGHT: f64 = 3.0;
 const MOST_BETWEEN: usize = 20_000;
 /// Of a map of many cells not more places along an axis than about this, farther apart.
 const MOST: f64 = 64.0;
+/// Of a plan with fewer places along an axis than this, as many more.
+const FEWEST: usize = 5;
 /// Halvings between two places towards a rim or a jump: to a few micrometres of millimetres.
 const HALVINGS: u32 = 9;
 
@@ -113,6 +115,12 @@ fn spread(plan: Axis, from: f64, cell_m: f64) -> Vec<f64> {
         .take_while(|place| *place < plan.to);
     let mut all: Vec<f64> = std::iter::once(plan.from).chain(inner).collect();
     all.push(plan.to);
+    if all.len() < FEWEST {
+        // Of so narrow a plan all of these may be nodes.
+        let golden = |n: usize| (n as f64 * 0.618_033_988_749_894_9).fract();
+        all.extend((1..=FEWEST).map(|n| plan.from + golden(n) * width_m));
+        all.sort_by(f64::total_cmp);
+    }
     all
 }
 
@@ -151,6 +159,26 @@ fn reach(axis: Axis, points_m: &[f64]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A plan of two cells had its ends and its middle, nodes of a finer map: a felt error of 1e-14 was stated.
+    #[test]
+    fn a_plan_of_two_cells_has_places_between_nodes() {
+        let half_m = 0.1 / 60.0;
+        let plan = Axis {
+            from: -half_m,
+            to: half_m,
+            samples: 5,
+        };
+        for cells in [8, 15, 30, 60] {
+            let all = spread(plan, -0.05, 0.1 / f64::from(cells));
+            assert!(all.windows(2).all(|pair| pair[0] <= pair[1]));
+            let middle = |place: &&f64| {
+                let cells = (**place + 0.05) / half_m;
+                (cells - cells.round()).abs() > 0.15
+            };
+            assert!(all.iter().filter(middle).count() >= 2, "{cells} {all:?}");
+        }
+    }
 
     /// Places on nodes alone would find maps without error.
     #[test]

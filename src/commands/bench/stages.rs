@@ -19,6 +19,7 @@ use crate::scene::sources::Sampling;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
 use crate::scene::{MAGNET_SHARE, Scene};
+use crate::shape::ShapeError;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
@@ -139,16 +140,30 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The points of every setting.
+    /// The points of every setting; one that meets none of the surface is dropped, unless it is in force now.
     pub fn all_points(
         &self,
         shape: &ShapeSource,
-        ladders: &Ladders,
+        ladders: &mut Ladders,
     ) -> Result<Vec<(ForcePoints, f64)>, RunError> {
-        let rungs = ladders.points.iter();
-        rungs
-            .map(|rung| self.timed(|within| self.points(&shape.document, rung.points, within)))
-            .collect()
+        let mut all = Vec::new();
+        let mut kept = Vec::new();
+        for rung in &ladders.points {
+            let found = self.timed(|within| self.points(&shape.document, rung.points, within));
+            match found {
+                Ok(points) => {
+                    all.push(points);
+                    kept.push(*rung);
+                }
+                Err(RunError::Shape {
+                    source: ShapeError::NoPoint { .. },
+                    ..
+                }) if !rung.present => {}
+                Err(error) => return Err(error),
+            }
+        }
+        ladders.points = kept;
+        Ok(all)
     }
 
     /// Forces at the points, and the force constants.

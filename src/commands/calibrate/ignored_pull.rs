@@ -96,7 +96,7 @@ pub(crate) fn sideways_left_out(file: &LambdaFile) -> Option<LeftOut> {
     Some(LeftOut {
         what: SIDEWAYS_PULL.to_owned(),
         why: "requests and currents count the upward one alone; the cost is relative to the requested force, \
-              root mean square"
+              root mean square, from a hundred points"
             .to_owned(),
         error_cost,
     })

@@ -113,8 +113,8 @@ pub(crate) fn add(
     Ok(())
 }
 
-/// The steel's sideways pull, root mean square over that of the requested force: of some points, as the upward pull of
-/// all is to theirs.
+/// The steel's sideways pull, root mean square over that of the requested force, to about a tenth of itself: of some
+/// points, as the upward pull of all is to theirs.
 fn sideways_share(
     pull: &Pull,
     positions_m: &[[f64; 3]],
@@ -139,6 +139,10 @@ fn sideways_share(
     let all: Vec<usize> = (0..positions_m.len()).collect();
     let upward = |point: usize| problem.offset_n.map_or(0.0, |all| all[point]);
     let requested = sum(&|point| lambda_n_per_m * problem.height_m[point], &all);
-    let ratio = sideways.iter().sum::<f64>() / sum(&upward, &some);
+    let of_some = sum(&upward, &some);
+    if of_some == 0.0 {
+        return 0.0;
+    }
+    let ratio = sideways.iter().sum::<f64>() / of_some;
     (ratio * sum(&upward, &all) / requested).sqrt()
 }

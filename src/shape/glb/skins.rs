@@ -113,7 +113,7 @@ impl Tree {
         for other in chains {
             fluxform_base::progress::poll();
             if !same(&place, &composed(&other?)) {
-                let what = "the GLB file bends a mesh by a skin (the pose of an armature), which is not \
+                let what = "the GLB file holds a skin whose joints are posed apart (an armature), which is not \
                             read: apply it and export it again";
                 return Err(what.into());
             }
