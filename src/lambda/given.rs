@@ -127,7 +127,7 @@ mod tests {
             forces_n_per_a: &[0.1, 0.2, 0.3, 0.1, 0.7, 0.7],
             height_m: &[0.05, 0.02, 0.001],
             offset_n: Some(&[0.01, -0.02, 0.0]),
-            weights: Some(&[1.0, 3.0, 0.0]),
+            weights: Some(&[1.0, 3.0, 1e-18]),
             lower_a: &[0.0; 2],
             upper_a: &[2.0; 2],
             total_max_a: None,
