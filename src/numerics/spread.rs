@@ -3,6 +3,12 @@
 /// The golden ratio's fraction: its multiples fill the unit interval most evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
+/// The `n`-th part of a sequence that fills `[0, 1)` evenly and never repeats.
+#[must_use]
+pub fn part(n: usize) -> f64 {
+    (n as f64 * GOLDEN).fract()
+}
+
 /// Indices of `most` of `count` items in order; of no more than that all.
 ///
 /// Of every of `most` equal parts one, at multiples of the golden ratio within it: over a grid that is stored row by
@@ -12,11 +18,10 @@ pub fn spread(count: usize, most: usize) -> Vec<usize> {
     if count <= most {
         return (0..count).collect();
     }
-    let from = |part: usize| part * count / most;
-    let within = |part: usize| {
-        let width = from(part + 1) - from(part);
-        let at = (part as f64 * GOLDEN).fract();
-        from(part) + (at * width as f64) as usize
+    let from = |number: usize| number * count / most;
+    let within = |number: usize| {
+        let width = from(number + 1) - from(number);
+        from(number) + (part(number) * width as f64) as usize
     };
     (0..most).map(within).collect()
 }

@@ -8,6 +8,7 @@ use super::Scene;
 use super::steel::Solved;
 use super::tolerances::MAGNET_FINEST;
 use crate::RunError;
+use crate::numerics::spread::part;
 use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
@@ -170,8 +171,7 @@ pub(crate) fn sharper_forces<const N: usize>(
 
 /// Indices spread evenly and irregularly over 0..count: multiples of the golden ratio.
 pub(crate) fn spread(count: usize, samples: usize) -> Vec<usize> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
     (0..samples.min(count))
-        .map(|i| (((i as f64 * GOLDEN).fract() * count as f64) as usize).min(count - 1))
+        .map(|i| ((part(i) * count as f64) as usize).min(count - 1))
         .collect()
 }

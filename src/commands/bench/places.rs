@@ -6,6 +6,7 @@ use super::stages::Bench;
 use crate::RunError;
 use crate::commands::calibrate::DEFAULT_REACH_M;
 use crate::numerics::axis::Axis;
+use crate::numerics::spread::part;
 use crate::progress::Silent;
 use crate::scene::sources::ShapeSource;
 use crate::shape::Surface;
@@ -22,7 +23,7 @@ const MOST_BETWEEN: usize = 20_000;
 const MOST: f64 = 64.0;
 /// Of a plan with fewer places along an axis than this, as many more.
 const FEWEST: usize = 5;
-/// Halvings between two places towards a rim or a jump: to a few micrometres of millimetres.
+/// Halvings between two places towards a rim or a jump: of a millimetre to two micrometres.
 const HALVINGS: u32 = 9;
 
 /// A place of the plan, m, and the surface's height there, m, if there is any.
@@ -117,8 +118,7 @@ fn spread(plan: Axis, from: f64, cell_m: f64) -> Vec<f64> {
     all.push(plan.to);
     if all.len() < FEWEST {
         // Of so narrow a plan all of these may be nodes.
-        let golden = |n: usize| (n as f64 * 0.618_033_988_749_894_9).fract();
-        all.extend((1..=FEWEST).map(|n| plan.from + golden(n) * width_m));
+        all.extend((1..=FEWEST).map(|n| plan.from + part(n) * width_m));
         all.sort_by(f64::total_cmp);
     }
     all

@@ -1,7 +1,8 @@
 //! Skinned meshes at rest: glTF places them by their joints and ignores their own node.
 //!
 //! A vertex goes where its joints, weighted, take it, each by its place in the scene after its inverse bind
-//! matrix (glTF 2.0, section 3.7.3.3). Where these products are one placement the mesh is not bent.
+//! matrix (glTF 2.0, section 3.7.3.3). Where these products are one placement for all joints of the skin, moved vertices or
+//! not, the mesh is not bent.
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::{Document, Scene, Skin};
