@@ -1,10 +1,10 @@
 //! Results of earlier runs, kept so that what has not changed is not computed again.
 //!
 //! An entry is one file: the digest of all that its value was computed from and of the folder it was
-//! kept in, that of the value, and the value. An entry of other origin, of another build of this program,
+//! kept in, the CRC-32 of the value, and the value. An entry of other origin, of another build of this program,
 //! made with other vector instructions (on another machine that shares the folder), or damaged is not
 //! used, and is overwritten. So is one that was made in another folder: whoever passes results on may
-//! have written anything into their store and the right digest beside it. A store that cannot be read
+//! have written anything into their store and the right check beside it. A store that cannot be read
 //! or written is none: results are the same without it.
 
 use std::ffi::OsStr;
@@ -21,6 +21,8 @@ use fluxform_numerics::dispatch;
 /// First bytes of every entry.
 const MAGIC: &[u8; 8] = b"fluxkept";
 const DIGEST: usize = 32;
+/// Bytes of the value's CRC-32: against damage alone, since whoever may write into the folder may write anything.
+const CHECK: usize = 4;
 /// Larger entries are not read.
 const ENTRY_MAX_BYTES: u64 = 16 << 30;
 
@@ -143,7 +145,7 @@ impl Store {
         let _ = atomic::put(&dir, name, false, |out| {
             out.write_all(MAGIC)?;
             out.write_all(&origin.digest(&dir, name))?;
-            out.write_all(&Sha256::digest(bytes))?;
+            out.write_all(&check(bytes))?;
             out.write_all(bytes)
         });
     }
@@ -184,17 +186,21 @@ fn payload(folder: &Dir, name: &str, origin: &Origin) -> Option<Vec<u8>> {
     }
     let mut file = folder.file(name).ok()?;
     // A large file that is none of ours is not read to its end.
-    let mut head = [0; MAGIC.len() + 2 * DIGEST];
+    let mut head = [0; MAGIC.len() + DIGEST + CHECK];
     file.read_exact(&mut head).ok()?;
-    let (magic, digests) = head.split_at(MAGIC.len());
-    let (of_origin, of_value) = digests.split_at(DIGEST);
+    let (magic, rest) = head.split_at(MAGIC.len());
+    let (of_origin, of_value) = rest.split_at(DIGEST);
     if magic != MAGIC || of_origin != origin.digest(folder, name) {
         return None;
     }
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(status.bytes as usize).ok()?;
     file.take(ENTRY_MAX_BYTES).read_to_end(&mut bytes).ok()?;
-    (of_value == &Sha256::digest(&bytes)[..]).then_some(bytes)
+    (of_value == check(&bytes)).then_some(bytes)
+}
+
+fn check(value: &[u8]) -> [u8; CHECK] {
+    crc32fast::hash(value).to_le_bytes()
 }
 
 /// Whether the file `name` begins as every entry does.
@@ -280,7 +286,7 @@ mod tests {
         assert!(!store.holds("wedge.pull", &origin) && store.holds("steel", &origin));
     }
 
-    /// A value with its right digest, in a folder that came from elsewhere.
+    /// A value with its right check, in a folder that came from elsewhere.
     #[cfg(target_os = "linux")]
     #[test]
     #[allow(clippy::disallowed_methods)] // a test's own files
@@ -288,11 +294,11 @@ mod tests {
         let origin = Origin::of_build("a").and_numbers([0.7]);
         let (folder, store, file) = kept(&origin);
         let mut forged = std::fs::read(&file).unwrap();
-        let value = MAGIC.len() + 2 * DIGEST;
+        let value = MAGIC.len() + DIGEST + CHECK;
         let last = forged.len() - 1;
         forged[last] ^= 0x40;
-        let digest = Sha256::digest(&forged[value..]);
-        forged[value - DIGEST..value].copy_from_slice(&digest);
+        let right = check(&forged[value..]);
+        forged[value - CHECK..value].copy_from_slice(&right);
         let sent = folder.path().join("sent");
         lay(&sent, "steel", &forged);
         let received = Store::in_folder(sent, "kept");
