@@ -8,7 +8,7 @@ use super::Scene;
 use super::steel::Solved;
 use super::tolerances::MAGNET_FINEST;
 use crate::RunError;
-use crate::numerics::spread::part;
+use crate::numerics::spread::spread;
 use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
@@ -167,11 +167,4 @@ pub(crate) fn sharper_forces<const N: usize>(
             proven.method
         ),
     })
-}
-
-/// Indices spread evenly and irregularly over 0..count: multiples of the golden ratio.
-pub(crate) fn spread(count: usize, samples: usize) -> Vec<usize> {
-    (0..samples.min(count))
-        .map(|i| ((part(i) * count as f64) as usize).min(count - 1))
-        .collect()
 }

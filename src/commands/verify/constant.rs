@@ -8,8 +8,8 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::load::Bundle;
 use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, ForceProblem, Settings};
+use crate::numerics::spread::spread;
 use crate::progress::Progress;
-use crate::scene::evaluation_sample::spread;
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;

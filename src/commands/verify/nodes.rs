@@ -6,7 +6,7 @@ use crate::RunError;
 use crate::bundle::load::Bundle;
 use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::lagrange;
-use crate::scene::evaluation_sample::spread;
+use crate::numerics::spread::spread;
 
 /// The components that a map holds: the name of each in checks, its place among what
 /// [`Route::gradients`] gives, and its values.

@@ -5,8 +5,8 @@ use super::{Bounds, Check, check, ratio};
 use crate::RunError;
 use crate::bundle::load::Bundle;
 use crate::map::tabulate::Grid;
+use crate::numerics::spread::spread;
 use crate::scene::Scene;
-use crate::scene::evaluation_sample::spread;
 use crate::scene::passive::{self, PASSIVE_TOLERANCE};
 use crate::scene::passive_map::PassiveMap;
 
