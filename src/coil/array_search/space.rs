@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use fluxform_base::units::m_from_mm;
 use fluxform_design::array::grid_positions_m;
+use fluxform_design::message_text::twelve_digits;
 use fluxform_design::search::{SearchKey, SearchLayout, SearchSpace, SearchValues};
 use fluxform_design::{ArrayGrid, Coil, Design};
 use fluxform_numerics::mixed_search::{Values, Variable};
@@ -155,8 +156,12 @@ const MOST_LAYERS: f64 = 400.0;
 const MOST_TURNS: f64 = 5000.0;
 
 fn mm(length_m: f64) -> f64 {
-    let value = length_m * 1e3;
-    format!("{value:.11e}").parse().unwrap_or(value)
+    twelve_digits(length_m * 1e3)
+}
+
+/// To nanometres, as it is written.
+fn to_nanometres(length_mm: f64) -> f64 {
+    (length_mm * 1e6).round() / 1e6 + 0.0
 }
 
 impl Space {
@@ -552,9 +557,7 @@ impl Space {
                     Axis::Plate(_) => 0.01 * MADE_MM,
                     _ => MADE_MM,
                 };
-                let near = (x / step).round() * step;
-                let near: f64 = format!("{near:.6}").parse().unwrap_or(near);
-                near.clamp(variable.low, variable.high)
+                to_nanometres((x / step).round() * step).clamp(variable.low, variable.high)
             }
             Values::Whole | Values::Listed(_) => *x,
         };
@@ -570,11 +573,10 @@ impl Space {
         let turns = self
             .value(x, Axis::TurnsPerLayer)
             .unwrap_or(self.turns_per_layer);
-        let decimals = |value: f64| -> f64 { format!("{value:.11e}").parse().unwrap_or(value) };
         [
             bore,
-            decimals(bore + 2.0 * layers * wire),
-            decimals(turns * wire),
+            twelve_digits(bore + 2.0 * layers * wire),
+            twelve_digits(turns * wire),
             layers * turns,
         ]
     }
@@ -614,8 +616,7 @@ impl Space {
                 }
             }
         }
-        let tidy = |x: f64| -> f64 { format!("{x:.6}").parse::<f64>().map_or(x, |x| x + 0.0) };
-        places.iter().map(|p| p.map(tidy)).collect()
+        places.iter().map(|p| p.map(to_nanometres)).collect()
     }
 
     /// The grid, where the coils lie on one.
@@ -678,11 +679,7 @@ impl Space {
         let wire = self.wire(x);
         let given = &self.base.wire;
         let share = given.conductor_diameter_m / given.diameter_m;
-        let conductor = wire * share;
-        [
-            wire,
-            format!("{conductor:.11e}").parse().unwrap_or(conductor),
-        ]
+        [wire, twelve_digits(wire * share)]
     }
 
     /// The keys that make the design at `x` of the given one, and keys to be left out.

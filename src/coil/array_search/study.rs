@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use fluxform_base::progress::Interrupted;
@@ -571,11 +572,14 @@ impl<'s, 'a> View<'s, 'a> {
     /// The best design by the surrogate under that judgement.
     fn best_below(&self, from: &[f64], name: LimitName, most: f64) -> Option<Vec<f64>> {
         let judge = |x: &[f64], outputs: &[f64]| self.judge_below(x, outputs, name, most);
-        let ends = self.starts(from, &judge).into_iter().filter_map(|start| {
+        let starts = self.starts(from, &judge);
+        let climb = |start: &Vec<f64>| {
             let search = &self.search;
-            search.climb_otherwise(&self.surrogate, &judge, &start, &[])
-        });
-        let met = ends.filter(|(_, ended)| ended.judged.excess() <= OFF);
+            search.climb_otherwise(&self.surrogate, &judge, start, &[])
+        };
+        let ends: Vec<_> = starts.par_iter().filter_map(climb).collect();
+        let met = ends.into_iter();
+        let met = met.filter(|(_, ended)| ended.judged.excess() <= OFF);
         let best = met.reduce(|a, b| {
             if b.1.judged.merit() > a.1.judged.merit() {
                 b

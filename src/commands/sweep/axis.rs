@@ -1,6 +1,7 @@
 //! The argument of `--set`: `KEY=FROM:TO:STEP` or `KEY=A,B,C`.
 
 use crate::bundle::sweep::{Axis, Value};
+use crate::design::message_text::twelve_digits;
 
 /// Most values of one axis.
 pub const VALUES_MAX: usize = 1_000_000;
@@ -100,11 +101,6 @@ fn steps([from, to, step]: [f64; 3]) -> Result<Vec<Value>, String> {
         ));
     }
     Ok(values.into_iter().map(Value::Number).collect())
-}
-
-/// `value` rounded to 12 significant digits.
-fn twelve_digits(value: f64) -> f64 {
-    format!("{value:.11e}").parse().unwrap_or(value)
 }
 
 fn list(text: &str) -> Result<Vec<Value>, String> {

@@ -98,45 +98,45 @@ const ENOUGH: f64 = 1e-3;
 /// assert!(interruptible(|| climb(&of, &[0.9], &[0.0], &[1.0])).is_err());
 /// ```
 pub fn climb(of: &dyn Fn(&[f64]) -> Judged, start: &[f64], low: &[f64], high: &[f64]) -> Ended {
-    let mut u: Vec<f64> = start
+    let u: Vec<f64> = start
         .iter()
         .zip(low.iter().zip(high))
         .map(|(u, (low, high))| u.clamp(*low, *high))
         .collect();
     let free: Vec<usize> = (0..u.len()).filter(|&i| high[i] > low[i]).collect();
-    let mut judged = of(&u);
-    let mut multipliers = vec![0.0; judged.limits.len()];
-    let mut curvature = DMatrix::identity(free.len(), free.len());
-    for _ in 0..TURNS {
-        if free.is_empty() || !judged.merit().is_finite() {
-            break;
-        }
-        poll();
-        let slopes = Slopes::new(of, &u, &free, low, high);
-        let room = |ends: &[f64]| -> Vec<f64> { free.iter().map(|&i| ends[i] - u[i]).collect() };
-        let Some(step) = slopes.step(&judged, &curvature, (&room(low), &room(high))) else {
-            break;
-        };
-        multipliers.clone_from(&step.limits);
-        let size = step.d.amax();
-        let Some((next, found)) = along(of, &u, &free, &step, &judged, low, high) else {
-            break;
-        };
-        let moved = DVector::from_fn(free.len(), |i, _| next[free[i]] - u[free[i]]);
-        let before = slopes.lagrangian(&step);
-        let after = Slopes::new(of, &next, &free, low, high).lagrangian(&step);
-        update(&mut curvature, &moved, &(after - before));
-        u = next;
-        judged = found;
-        if size < STILL {
-            break;
-        }
-    }
-    Ended {
-        u,
+    let judged = of(&u);
+    let mut ended = Ended {
+        multipliers: vec![0.0; judged.limits.len()],
         judged,
-        multipliers,
+        u,
+    };
+    if free.is_empty() || !ended.judged.merit().is_finite() {
+        return ended;
     }
+    let mut curvature = DMatrix::identity(free.len(), free.len());
+    let mut slopes = Slopes::new(of, &ended.u, &ended.judged, (&free, low, high));
+    for _ in 0..TURNS {
+        poll();
+        let Ended { u, judged, .. } = &ended;
+        let room = |ends: &[f64]| -> Vec<f64> { free.iter().map(|&i| ends[i] - u[i]).collect() };
+        let Some(step) = slopes.step(judged, &curvature, (&room(low), &room(high))) else {
+            break;
+        };
+        ended.multipliers.clone_from(&step.limits);
+        let Some((next, found)) = along(of, &ended.u, &free, &step, &ended.judged, low, high)
+        else {
+            break;
+        };
+        let moved = DVector::from_fn(free.len(), |i, _| next[free[i]] - ended.u[free[i]]);
+        let before = slopes.lagrangian(&step);
+        slopes = Slopes::new(of, &next, &found, (&free, low, high));
+        update(&mut curvature, &moved, &(slopes.lagrangian(&step) - before));
+        (ended.u, ended.judged) = (next, found);
+        if step.d.amax() < STILL || !ended.judged.merit().is_finite() {
+            break;
+        }
+    }
+    ended
 }
 
 struct Step {
@@ -180,14 +180,13 @@ struct Slopes {
 }
 
 impl Slopes {
+    /// At `u`, where the values are `here`.
     fn new(
         of: &dyn Fn(&[f64]) -> Judged,
         u: &[f64],
-        free: &[usize],
-        low: &[f64],
-        high: &[f64],
+        here: &Judged,
+        (free, low, high): (&[usize], &[f64], &[f64]),
     ) -> Self {
-        let here = of(u);
         let mut objectives = DMatrix::zeros(here.objectives.len(), free.len());
         let mut limits = DMatrix::zeros(here.limits.len(), free.len());
         for (column, &i) in free.iter().enumerate() {
