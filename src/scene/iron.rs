@@ -10,7 +10,7 @@ use crate::RunError;
 use crate::design::iron::{Hole, Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::named_file::Role;
 use crate::design::{Coupling, Design};
-use crate::field::iron::array::{IronArray, IronPeaks, MOST_FACETS, Peak, Unsolved};
+use crate::field::iron::array::{Depths, IronArray, IronPeaks, MOST_FACETS, Peak, Unsolved};
 use crate::field::iron::bodies::{
     Body, Coils, Contact, Fault, Iron, Outline, Piece, Plate, Site, Solid, UPRIGHT, contact,
 };
@@ -18,6 +18,7 @@ use crate::field::iron::clearance::meeting_m;
 use crate::field::iron::face::Point;
 use crate::field::iron::mesh_body::MeshBody;
 use crate::field::iron::prisms::connected;
+use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::winding::Winding;
 use crate::shape::closed_body::{BodyRequest, ClosedBodies};
 
@@ -282,11 +283,13 @@ impl SceneIron {
     }
 
     /// How far inside its surface the largest |B| is looked for, m.
-    pub(super) fn depth_m(&self) -> f64 {
-        let solids = self.solids().into_iter();
-        solids.fold(DEPTH_M, |depth, body| {
-            depth.min(DEPTH_PART * body.thickness_m())
-        })
+    pub(super) fn depths(&self, core: Option<&SceneCore>) -> Depths {
+        let of_solid = |body: Body| DEPTH_PART * body.thickness_m();
+        let solids = self.solids().into_iter().map(of_solid);
+        Depths {
+            cores_m: core.map_or(DEPTH_M, |core| peak_depth_m(core.shape)),
+            elsewhere_m: solids.fold(DEPTH_M, f64::min),
+        }
     }
 }
 

@@ -124,7 +124,9 @@ impl Solved {
         let (Some(iron), Some(array)) = (&scene.iron, self.steel().iron()) else {
             return Ok(None);
         };
-        Ok(Some(array.peaks(currents_a, iron.depth_m())?))
+        Ok(Some(
+            array.peaks(currents_a, iron.depths(scene.core.as_ref()))?,
+        ))
     }
 
     /// How far B is from that of a coarser solution at some of `points_m`, relative to |B| there; `None` where steel is

@@ -2,7 +2,7 @@
 
 use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::components::Components;
-use fluxform_field::iron::array::{IronArray, Unsolved};
+use fluxform_field::iron::array::{Depths, IronArray, Unsolved};
 use fluxform_field::iron::bodies::{Coils, Fault, Iron, Outline, Plate, Site};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
@@ -22,6 +22,11 @@ const SHAPE: CoreShape = CoreShape {
     radius_m: 0.012,
     bottom_m: -0.11,
     top_m: 0.0,
+};
+
+const DEPTHS: Depths = Depths {
+    cores_m: 0.001,
+    elsewhere_m: 0.001,
 };
 
 fn coils(positions_m: &[[f64; 2]], chi: f64) -> Coils<'_> {
@@ -94,7 +99,7 @@ fn the_estimate_covers_the_difference_from_coupled_cores() {
     assert!(array.relative_error <= 3e-3, "{}", array.relative_error);
     let known = CoupledArray::new(&WINDING, SHAPE, 1000.0, &positions_m, 1e-5, 0.02).unwrap();
     let currents = [1.0, -0.4];
-    let peaks = array.peaks(&currents, 0.001).unwrap();
+    let peaks = array.peaks(&currents, DEPTHS).unwrap();
     let inside = known.core_fields(&currents, 0.001).unwrap();
     for (peak, exact) in peaks.cores.iter().zip(&inside) {
         let (error_t, from_t) = (peak.error_t.unwrap(), (peak.field_t - exact.peak_t).abs());
@@ -216,7 +221,7 @@ fn a_plate_joins_the_cores_and_closes_the_flux() {
     let currents = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
     let at = |z: f64| array.field_t([0.001, 0.002, z], &currents).unwrap();
     assert!(at(-0.105)[2].abs() > 0.5 * at(-0.05)[2].abs());
-    let peaks = array.peaks(&currents, 0.001).unwrap();
+    let peaks = array.peaks(&currents, DEPTHS).unwrap();
     assert!(peaks.cores[4].field_t > at(-0.05)[2].abs(), "{peaks:?}");
     // All of the driven core's flux goes out through the plate about its foot, and crowds at the concave edge there.
     // Finer panels have 1.623 and 1.625 T in the core, 1.584 and 1.587 T in the plate.
@@ -358,6 +363,38 @@ fn a_hole_in_the_plate_takes_flux_as_far_as_it_is_in_its_way() {
     for (coarse, fine) in between.iter().zip(finer) {
         assert!((coarse / fine - 1.0).abs() < 0.1, "{coarse} {fine}");
     }
+}
+
+/// Along a rim far from nodes a place may be away from all of them and on the surface, where a layer's field has no end.
+#[test]
+fn the_largest_flux_density_is_inside_the_steel() {
+    let with = coils(&[[0.0, 0.0]], 999.0);
+    let depths = Depths {
+        elsewhere_m: 0.0005,
+        ..DEPTHS
+    };
+    let of = |holes: Vec<Site>| {
+        let holed = Plate {
+            holes,
+            ..plate(Outline::Round(0.09), SHAPE.bottom_m - 0.001, 0.005, 999.0)
+        };
+        let iron = Iron::new(with, Some(&holed)).unwrap();
+        let array = IronArray::new(with, &iron, 0.05, 0.03).unwrap();
+        (array.peaks(&[2.0], depths).unwrap().elsewhere, holed)
+    };
+    let (whole, _) = of(Vec::new());
+    let (peak, holed) = of(vec![Site {
+        at_m: [0.03, 0.02],
+        radius_m: 0.002,
+    }]);
+    assert!(
+        holed.distance_m(peak.place_m) <= -0.97 * depths.elsewhere_m,
+        "{peak:?}"
+    );
+    assert!(
+        (peak.field_t / whole.field_t - 1.0).abs() < 0.1,
+        "{peak:?} {whole:?}"
+    );
 }
 
 #[test]

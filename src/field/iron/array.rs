@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::axial_profile::AxialProfile;
 pub use super::bodies::RESOLUTIONS;
 use super::bodies::{Coils, Iron};
+use super::clearance::is_within;
 use super::face::{Node, Point, SAME_M};
 use super::inductance::{Linkage, least_h};
 use super::parts::Halvings;
@@ -30,6 +31,8 @@ pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
 const SOLVER_SHARE: f64 = 0.02;
 /// Share of the tolerance given to the integration of inductances.
 const FLUX_SHARE: f64 = 0.2;
+/// Part of the depth that a place below a node is inside the surface at least: a curved one bends towards it.
+const DEEP: f64 = 0.98;
 /// Steps from the best node to the largest |B|.
 const CLIMBS: usize = 12;
 /// Places, one after the other along the surface, that share the parts of panels close to them.
@@ -480,6 +483,15 @@ pub struct Peak {
     pub error_t: Option<f64>,
 }
 
+/// How far inside the steel's surface the largest |B| is looked for, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Depths {
+    /// In cores.
+    pub cores_m: f64,
+    /// In the rest.
+    pub elsewhere_m: f64,
+}
+
 /// The largest |B| of every part of the steel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IronPeaks {
@@ -490,16 +502,16 @@ pub struct IronPeaks {
 }
 
 impl IronArray {
-    /// The largest |B| with `currents_a` at least `depth_m` inside the steel's surface.
+    /// The largest |B| with `currents_a` at least `depths` inside the steel's surface.
     ///
     /// # Errors
     /// A place on a winding's edge.
-    pub fn peaks(&self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
-        let mut peaks = self.own_peaks(currents_a, depth_m)?;
+    pub fn peaks(&self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
+        let mut peaks = self.own_peaks(currents_a, depths)?;
         let Some(coarser) = &self.coarser else {
             return Ok(peaks);
         };
-        let other = coarser.own_peaks(currents_a, depth_m)?;
+        let other = coarser.own_peaks(currents_a, depths)?;
         let layers = coarser.layers_at(currents_a);
         let compare = |peak: &mut Peak, other: &Peak| -> Result<(), OnEdge> {
             let halvings = &mut Halvings::new();
@@ -518,35 +530,30 @@ impl IronArray {
     }
 
     /// The same, without errors.
-    fn own_peaks<'a>(&'a self, currents_a: &[f64], depth_m: f64) -> Result<IronPeaks, OnEdge> {
+    fn own_peaks<'a>(&'a self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
         let mut nodes: Vec<Candidate> = Vec::new();
         for (image, signs) in self.images.iter().enumerate() {
             nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
                 let of = |core| moved(&self.positions_m, core, *signs, self.planes_m);
                 let core = self.surface.face_of(number).bore.map(of);
                 let node = mirrored(node, *signs, self.planes_m);
-                let normal = node.area_m2.map(|n| n / norm(node.area_m2));
+                let depth_m = core.map_or(depths.elsewhere_m, |_| depths.cores_m);
                 Candidate {
                     image,
                     number,
                     core,
-                    on_surface_m: node.place_m,
-                    place_m: inside(node.place_m, normal, depth_m),
+                    depth_m,
+                    place_m: inside(&node, depth_m),
                 }
             }));
         }
-        let surface_m: Vec<Point> = nodes.iter().map(|node| node.on_surface_m).collect();
-        let deep = |place: Point| {
-            fluxform_base::progress::poll();
-            let far = |other: &Point| apart(place, *other) >= 0.98 * depth_m;
-            surface_m.iter().all(far)
-        };
-        let candidates: Vec<&Candidate> =
-            nodes.par_iter().filter(|node| deep(node.place_m)).collect();
+        let deep = |candidate: &&Candidate| self.is_deep(candidate.place_m, candidate.depth_m);
+        let candidates: Vec<&Candidate> = nodes.par_iter().filter(deep).collect();
         let mut sparse: Vec<&Candidate> = Vec::new();
         for candidate in candidates {
             fluxform_base::progress::poll();
-            let far = |other: &&Candidate| apart(candidate.place_m, other.place_m) >= 0.5 * depth_m;
+            let least_m = 0.5 * candidate.depth_m;
+            let far = |other: &&Candidate| apart(candidate.place_m, other.place_m) >= least_m;
             if sparse.iter().all(far) {
                 sparse.push(candidate);
             }
@@ -581,7 +588,7 @@ impl IronArray {
         let climbed = best
             .into_par_iter()
             .map(|best| match best {
-                Some((value, from)) => self.climb(value, from, depth_m, &field_t, &deep),
+                Some((value, from)) => self.climb(value, from, &field_t),
                 None => Ok(Peak::default()),
             })
             .collect::<Result<Vec<Peak>, OnEdge>>()?;
@@ -591,14 +598,23 @@ impl IronArray {
         })
     }
 
+    /// Whether a place is as far inside the surface as that: about it a layer's field grows without bound.
+    fn is_deep(&self, place_m: Point, depth_m: f64) -> bool {
+        fluxform_base::progress::poll();
+        let [cx, cy] = self.planes_m;
+        let [x, y, z] = place_m;
+        !self.images.iter().any(|[sx, sy]| {
+            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
+            is_within(&self.surface, own, DEEP * depth_m)
+        })
+    }
+
     /// From a node's place to the largest |B| about it, along the surface at the same depth.
     fn climb<'a>(
         &'a self,
         value_t: f64,
         from: &Candidate,
-        depth_m: f64,
         field_t: &impl Fn(Point, &mut Halvings<'a>) -> Result<f64, OnEdge>,
-        deep: &impl Fn(Point) -> bool,
     ) -> Result<Peak, OnEdge> {
         let face = self.surface.face_of(from.number);
         let [[mut u, mut v], mut step] = self.surface.parameters(from.number);
@@ -618,9 +634,8 @@ impl IronArray {
                 let (place_m, area_m2) = face.point(a, b);
                 let node = Node { place_m, area_m2 };
                 let node = mirrored(&node, self.images[from.image], self.planes_m);
-                let normal = node.area_m2.map(|n| n / norm(node.area_m2));
-                let place_m = inside(node.place_m, normal, depth_m);
-                if !deep(place_m) {
+                let place_m = inside(&node, from.depth_m);
+                if !self.is_deep(place_m, from.depth_m) {
                     continue;
                 }
                 let value = field_t(place_m, &mut halvings)?;
@@ -642,10 +657,12 @@ struct Candidate {
     image: usize,
     number: usize,
     core: Option<usize>,
-    on_surface_m: Point,
+    depth_m: f64,
     place_m: Point,
 }
 
-fn inside(place_m: Point, normal: Point, depth_m: f64) -> Point {
-    std::array::from_fn(|i| place_m[i] - depth_m * normal[i])
+/// The place so far below a node.
+fn inside(node: &Node, depth_m: f64) -> Point {
+    let by = depth_m / norm(node.area_m2);
+    std::array::from_fn(|i| node.place_m[i] - by * node.area_m2[i])
 }

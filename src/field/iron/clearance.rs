@@ -1,10 +1,15 @@
-//! Whether bodies are clear of each other.
+//! Whether bodies, and places, are clear of surfaces.
 
 use super::bodies::Body;
 use super::face::{Face, Panel, Point};
+use super::surface::Surface;
+use fluxform_numerics::vec3::{dot, minus, norm};
 
-/// Halvings of a face within which its distance from another body is looked for.
+/// Halvings of a face within which its distance from another body is looked for: two that lie along each other are
+/// as far apart everywhere.
 const MOST_HALVINGS: usize = 10;
+/// The same from a place, which few pieces are near.
+const MOST_ABOUT_A_PLACE: usize = 60;
 /// Rounding of a distance, m.
 const ROUNDING_M: f64 = 1e-12;
 /// A piece of a curved face reaches no farther than so many of its rim's distances.
@@ -18,27 +23,53 @@ pub fn meeting_m(a: &Body, b: &Body, least_m: f64) -> Option<Point> {
         let mut pieces = faces.iter();
         pieces.find_map(|face| {
             let whole = Panel::new(face, 0, [0.0, 1.0, 0.0, 1.0], 1);
-            closer_m(face, &whole, b, least_m - ROUNDING_M, 0)
+            let distance_m = |at| b.distance_m(at);
+            closer_m(
+                face,
+                &whole,
+                &distance_m,
+                least_m - ROUNDING_M,
+                MOST_HALVINGS,
+            )
         })
     };
     of(a, b).or_else(|| of(b, a))
 }
 
-fn closer_m(face: &Face, piece: &Panel, b: &Body, least_m: f64, halvings: usize) -> Option<Point> {
-    let distance = b.distance_m(piece.centre_m);
+/// Whether a place of `surface` is closer to `place_m` than `least_m`.
+pub(super) fn is_within(surface: &Surface, place_m: Point, least_m: f64) -> bool {
+    let distance_m = |at| norm(minus(at, place_m));
+    surface.panels().iter().any(|panel| {
+        let away = minus(panel.centre_m, place_m);
+        let beside = |normal| dot(normal, away).abs() >= least_m;
+        let face = &surface.faces[panel.face];
+        !panel.plane.is_some_and(beside)
+            && closer_m(face, panel, &distance_m, least_m, MOST_ABOUT_A_PLACE).is_some()
+    })
+}
+
+/// A place on a piece of a face where `distance_m` is below `least_m`.
+fn closer_m(
+    face: &Face,
+    piece: &Panel,
+    distance_m: &dyn Fn(Point) -> f64,
+    least_m: f64,
+    halvings: usize,
+) -> Option<Point> {
+    let distance = distance_m(piece.centre_m);
     if distance < least_m {
         return Some(piece.centre_m);
     }
     if distance - BULGE * piece.radius_m >= least_m {
         return None;
     }
-    if halvings < MOST_HALVINGS {
+    if halvings > 0 {
         let halves = piece.halves(face);
         let mut halves = halves.iter();
-        return halves.find_map(|half| closer_m(face, half, b, least_m, halvings + 1));
+        return halves.find_map(|half| closer_m(face, half, distance_m, least_m, halvings - 1));
     }
     let [u0, u1, v0, v1] = piece.range;
     let corners = [(u0, v0), (u0, v1), (u1, v0), (u1, v1)];
     let mut corners = corners.into_iter().map(|(u, v)| face.point(u, v).0);
-    corners.find(|place| b.distance_m(*place) < least_m)
+    corners.find(|place| distance_m(*place) < least_m)
 }
