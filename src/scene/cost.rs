@@ -5,6 +5,9 @@
 
 use super::Scene;
 use super::coupled;
+use super::iron::SceneIron;
+use super::passive::iron_tolerance;
+use super::passive_iron::RegionPull;
 use super::sources::ShapeSource;
 use super::tolerances::Tolerances;
 use crate::design::Design;
@@ -26,6 +29,8 @@ const FORCE_BYTES: f64 = 32.0;
 const PROBE_VALUE_BYTES: f64 = 16.0;
 /// Operations a second of one thread on the products of a coupled array.
 const OPERATIONS_PER_S: f64 = 2e9;
+/// The same on dense matrices.
+const DENSE_OPERATIONS_PER_S: f64 = 1e10;
 
 /// Processor time of a stage on one thread, right within a factor of about three.
 struct Law {
@@ -356,14 +361,20 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
     })
 }
 
-/// The pull of a coupled array's unpowered steel, to `tolerance` of it; `None` where the design leaves it
-/// out (then few cores are coupled), or does not say enough.
+/// The pull of the unpowered steel of a coupled array, or of a plate and other bodies, to `tolerance` of it; `None` where
+/// the design leaves it out (then it is solved roughly), or does not say enough.
 #[must_use]
 pub fn of_pull(design: &Design, tolerance: f64) -> Option<Cost> {
-    if !design.magnet.passive_force || !coupled(design) {
+    if !design.magnet.passive_force {
         return None;
     }
     let scene = Scene::new(design).ok()?;
+    if let Some(iron) = &scene.iron {
+        return of_iron_pull(&scene, iron, tolerance);
+    }
+    if !coupled(design) {
+        return None;
+    }
     let positions_m = &design.array.positions_m;
     let cost = ArrayCost::of_pull(
         scene.core.as_ref()?.shape,
@@ -376,6 +387,21 @@ pub fn of_pull(design: &Design, tolerance: f64) -> Option<Cost> {
         bytes: cost.bytes,
         cpu_seconds: cost.operations / OPERATIONS_PER_S,
         reduce: "use fewer coils, coupling = \"none\", or leave the pull out (passive_force = false)",
+        misses: None,
+    })
+}
+
+fn of_iron_pull(scene: &Scene, iron: &SceneIron, tolerance: f64) -> Option<Cost> {
+    let tolerance = iron_tolerance(scene, tolerance);
+    let [unknowns, parts, places] = RegionPull::least_work(scene, iron, tolerance)?;
+    // Factors of every part's matrix, then two solutions of triangles a place.
+    let factors = 2.0 / 3.0 * (unknowns as f64).powi(3) * parts as f64;
+    let solutions = 2.0 * product(&[unknowns, unknowns, parts, places]);
+    Some(Cost {
+        what: "the pull of the plate and other bodies".to_owned(),
+        bytes: 2.0 * size_of::<f64>() as f64 * product(&[unknowns, unknowns, parts]),
+        cpu_seconds: (factors + solutions) / DENSE_OPERATIONS_PER_S,
+        reduce: "give a larger --tolerance, or leave the pull out (passive_force = false)",
         misses: None,
     })
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::iron::SceneIron;
-use super::passive_iron::{TabulatedPull, magnet_of, too_close};
+use super::passive_iron::{RegionPull, Wanted, magnet_of, too_close};
 use super::passive_table::{region, scattered_z_n};
 use super::prepared_field::rounded_down;
 use super::{Scene, coupled};
@@ -22,7 +22,7 @@ use crate::numerics::axis::Axis;
 pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
 /// The same where the pull is left out: how large it is matters to some digits only.
-pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+const LEFT_OUT_TOLERANCE: f64 = 1e-2;
 /// The same of a plate and other bodies, whose finer panels take a minute.
 const IRON_LEFT_OUT: f64 = 0.05;
 /// Of a tolerance where the pull is left out what tabulating it may add.
@@ -37,7 +37,7 @@ pub enum Pull {
     /// Of cores.
     Cores(Box<PassivePull>),
     /// Of a plate, other bodies and the cores with them.
-    Iron(Arc<TabulatedPull>),
+    Iron(Arc<RegionPull>),
 }
 
 impl Pull {
@@ -92,15 +92,18 @@ pub(super) fn left_out_region(scene: &Scene, places_m: &[[f64; 3]]) -> Region {
     }
 }
 
-/// The pull over `region` where a design leaves it out, to [`LEFT_OUT_TOLERANCE`]; `None` without steel.
+/// The pull over `region` where a design leaves it out, to [`left_out_tolerance`]; `None` without steel.
 ///
 /// # Errors
 /// A magnet that touches the steel.
 pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, RunError> {
     if let Some(iron) = &scene.iron {
-        let tolerance = iron_tolerance(scene, IRON_LEFT_OUT);
-        let pull = scene.pulls.of(scene, iron, region, tolerance)?;
-        return Ok(pull.map(Pull::Iron));
+        let wanted = Wanted {
+            region,
+            tolerance: left_out_tolerance(scene),
+            tabulated: false,
+        };
+        return Ok(scene.pulls.of(scene, iron, wanted)?.map(Pull::Iron));
     }
     let Some(pulled) = pulled(scene, region, false) else {
         return Ok(None);
@@ -109,7 +112,7 @@ pub(super) fn left_out(scene: &Scene, region: Region) -> Result<Option<Pull>, Ru
         coupled: couples_left_out(scene),
         ..pulled
     };
-    of_cores(&pulled, LEFT_OUT_TOLERANCE).map(Some)
+    of_cores(&pulled, left_out_tolerance(scene)).map(Some)
 }
 
 /// Vertical pull at `places_m` from [`left_out`], N: from a table, and from the pull itself where it is strongest.
@@ -118,8 +121,15 @@ pub(super) fn left_out_z_n(scene: &Scene, pull: &Pull, places_m: &[[f64; 3]]) ->
         scene,
         |at_m| pull.forces_z_n(at_m),
         places_m,
-        TABLE_SHARE * LEFT_OUT_TOLERANCE,
+        TABLE_SHARE * left_out_tolerance(scene),
     )
+}
+
+fn left_out_tolerance(scene: &Scene) -> f64 {
+    match scene.iron {
+        Some(_) => iron_tolerance(scene, IRON_LEFT_OUT),
+        None => LEFT_OUT_TOLERANCE,
+    }
 }
 
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
@@ -180,11 +190,13 @@ fn of_iron(
     iron: &SceneIron,
     places_m: &[[f64; 3]],
     tolerance: f64,
-) -> Result<Option<Arc<TabulatedPull>>, RunError> {
-    let region = left_out_region(scene, places_m);
-    scene
-        .pulls
-        .of(scene, iron, region, iron_tolerance(scene, tolerance))
+) -> Result<Option<Arc<RegionPull>>, RunError> {
+    let wanted = Wanted {
+        region: left_out_region(scene, places_m),
+        tolerance: iron_tolerance(scene, tolerance),
+        tabulated: true,
+    };
+    scene.pulls.of(scene, iron, wanted)
 }
 
 /// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a

@@ -1,4 +1,5 @@
-//! The pull of a plate, other bodies and the cores with them: solved on all steel, then tabulated.
+//! The pull of a plate, other bodies and the cores with them: solved on all steel, and tabulated where many places
+//! ask for it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -25,23 +26,33 @@ const STEP: f64 = 0.02;
 
 /// The pull over a region.
 #[derive(Debug, Clone)]
-pub struct TabulatedPull {
+pub struct RegionPull {
     pull: IronPull,
-    table: Table,
+    /// Of the vertical force; `None`: every place is solved for.
+    table: Option<Table>,
     top_m: f64,
     /// Estimated error of a force, relative to its length: of the solution and of tabulating it.
     pub relative_error: f64,
 }
 
-/// A pull with the region and the tolerance (as bits) that it was made for.
-type Held = (Region, u64, Option<Arc<TabulatedPull>>);
+/// What a pull is made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wanted {
+    pub(super) region: Region,
+    /// Of a force, relative to its length.
+    pub(super) tolerance: f64,
+    /// Whether its vertical force is tabulated over the whole region.
+    pub(super) tabulated: bool,
+}
+
+type Held = (Wanted, Option<Arc<RegionPull>>);
 
 /// The pulls that were last asked for; copies of a scene share them. Each depends on what it is for alone.
 #[derive(Debug, Clone, Default)]
 pub(super) struct HeldPulls(Arc<Mutex<Vec<Held>>>);
 
 impl HeldPulls {
-    /// The pull of `iron` over `region`, to `tolerance`; `None` where it does not answer.
+    /// The pull of `iron`; `None` where it does not answer.
     ///
     /// # Errors
     /// A magnet that touches the steel; a core beside the plate.
@@ -49,29 +60,27 @@ impl HeldPulls {
         &self,
         scene: &Scene,
         iron: &SceneIron,
-        region: Region,
-        tolerance: f64,
-    ) -> Result<Option<Arc<TabulatedPull>>, RunError> {
+        wanted: Wanted,
+    ) -> Result<Option<Arc<RegionPull>>, RunError> {
         // One after the other: a second thread waits for the first one's.
         let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let bits = tolerance.to_bits();
-        if let Some((.., pull)) = held.iter().find(|held| (held.0, held.1) == (region, bits)) {
+        if let Some((_, pull)) = held.iter().find(|(of, _)| *of == wanted) {
             return Ok(pull.clone());
         }
-        let pull = TabulatedPull::new(scene, iron, region, tolerance)?.map(Arc::new);
+        let pull = RegionPull::new(scene, iron, wanted)?.map(Arc::new);
         held.truncate(HELD - 1);
-        held.insert(0, (region, bits, pull.clone()));
+        held.insert(0, (wanted, pull.clone()));
         Ok(pull)
     }
 }
 
-impl TabulatedPull {
-    fn new(
-        scene: &Scene,
-        iron: &SceneIron,
-        region: Region,
-        tolerance: f64,
-    ) -> Result<Option<Self>, RunError> {
+impl RegionPull {
+    fn new(scene: &Scene, iron: &SceneIron, wanted: Wanted) -> Result<Option<Self>, RunError> {
+        let Wanted {
+            region,
+            tolerance,
+            tabulated,
+        } = wanted;
         let (top_m, _) = scene.steel_extent_m().unwrap_or_default();
         let (moment_a_m2, size) = magnet_of(scene);
         let lowest_m = region.z_m[0];
@@ -84,17 +93,49 @@ impl TabulatedPull {
         let Some(pull) = IronPull::new(&bodies, magnet, &places_m, tolerance) else {
             return Ok(None);
         };
-        let sure = pull.forces_n(&places_m);
-        let ranges = [region.x_m, region.y_m, region.z_m];
+        let solved = Self {
+            relative_error: pull.relative_error,
+            pull,
+            table: None,
+            top_m,
+        };
+        Ok(Some(match tabulated {
+            true => solved.with_table(scene, &wanted, &places_m),
+            false => solved,
+        }))
+    }
+
+    /// What the pull of `iron` over the whole workspace takes at least: unknowns of a mirrored part, number of the parts,
+    /// and places of the table; `None` where it does not answer.
+    pub(super) fn least_work(
+        scene: &Scene,
+        iron: &SceneIron,
+        tolerance: f64,
+    ) -> Option<[usize; 3]> {
+        let (top_m, _) = scene.steel_extent_m()?;
+        let workspace = &scene.design.workspace;
+        let ranges =
+            [&workspace.x_m, &workspace.y_m, &workspace.z_m].map(|axis| [axis.from, axis.to]);
         let turns = symmetries_of(scene, ranges);
-        let mut aim = TABLE_SHARE * tolerance;
+        let aim = TABLE_SHARE * tolerance;
+        let layout = Layout::new(ranges, [top_m, axial_m(scene)], &turns, aim);
+        let (_, bodies) = iron.bodies(scene).ok()?;
+        let [unknowns, parts] = IronPull::least_size(&bodies, tolerance);
+        Some([unknowns, parts, layout.evaluations()])
+    }
+
+    /// The same with a table, and its error at `places_m`.
+    fn with_table(self, scene: &Scene, wanted: &Wanted, places_m: &[[f64; 3]]) -> Self {
+        let Region { x_m, y_m, z_m } = wanted.region;
+        let ranges = [x_m, y_m, z_m];
+        let sure = self.pull.forces_n(places_m);
+        let turns = symmetries_of(scene, ranges);
+        let allowed = TABLE_SHARE * wanted.tolerance;
+        let mut aim = allowed;
         let mut best: Option<(f64, Table)> = None;
         for _ in 0..ATTEMPTS {
-            let layout = Layout::new(ranges, [top_m, axial_m(scene)], &turns, aim);
-            let table = layout.filled(|places_m| {
-                let forces = pull.forces_n(places_m);
-                forces.into_iter().map(|force| force[2]).collect()
-            });
+            let layout = Layout::new(ranges, [self.top_m, axial_m(scene)], &turns, aim);
+            let table = layout.filled(|places_m| self.forces_z_n(places_m));
             let error = places_m.iter().zip(&sure).map(|(at, sure)| {
                 let length = sure.iter().map(|f| f * f).sum::<f64>().sqrt();
                 (table.at(*at) - sure[2]).abs() / length
@@ -103,17 +144,17 @@ impl TabulatedPull {
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, table));
             }
-            if error <= TABLE_SHARE * tolerance {
+            if error <= allowed {
                 break;
             }
             aim *= 0.1;
         }
-        Ok(best.map(|(error, table)| Self {
-            relative_error: pull.relative_error + error,
-            pull,
+        let (error, table) = best.unzip();
+        Self {
+            relative_error: self.relative_error + error.unwrap_or(0.0),
             table,
-            top_m,
-        }))
+            ..self
+        }
     }
 
     /// Force at one place, N, solved for it.
@@ -122,10 +163,16 @@ impl TabulatedPull {
         self.pull.forces_n(&[at_m])[0]
     }
 
-    /// Vertical forces, N, by the table.
+    /// Vertical forces, N: by the table, if there is one.
     #[must_use]
     pub fn forces_z_n(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
-        places_m.iter().map(|at| self.table.at(*at)).collect()
+        match &self.table {
+            Some(table) => places_m.iter().map(|at| table.at(*at)).collect(),
+            None => {
+                let forces = self.pull.forces_n(places_m);
+                forces.into_iter().map(|force| force[2]).collect()
+            }
+        }
     }
 
     /// The same by another route: the slope of the magnet's energy, solved for every place.

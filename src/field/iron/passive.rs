@@ -95,6 +95,18 @@ impl Answer {
     }
 }
 
+/// The first and the last of the [`RESOLUTIONS`] to try for a tolerance, in the memory that there is.
+fn tiers(iron: &Iron, tolerance: f64) -> [usize; 2] {
+    let images = iron.images().len();
+    // Entries and their factors are held at once.
+    let fits = |tier: &usize| {
+        let size = iron.surface_for_magnets(*tier).size();
+        2 * images * size.pow(2) <= MOST_ENTRIES
+    };
+    let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
+    [coarsest(tolerance).min(last - 1), last]
+}
+
 /// The pull on a magnet.
 #[derive(Debug, Clone)]
 pub struct IronPull {
@@ -117,17 +129,9 @@ impl IronPull {
         places_m: &[Point],
         tolerance: f64,
     ) -> Option<Self> {
-        let requested = coarsest(tolerance);
-        let images = iron.images().len();
-        // Entries and their factors are held at once.
-        let fits = |tier: &usize| {
-            let size = iron.surface_for_magnets(*tier).size();
-            2 * images * size.pow(2) <= MOST_ENTRIES
-        };
-        let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
         let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
         let bound = magnet.magnet_rule(lowest_m).bound();
-        let first = requested.min(last - 1);
+        let [first, last] = tiers(iron, tolerance);
         let mut pull = Self::at_resolution(iron, magnet, first)?;
         let coarsest = pull.forces_n(places_m);
         let mut forces = coarsest.clone();
@@ -146,6 +150,14 @@ impl IronPull {
             forces = finer;
         }
         Some(pull)
+    }
+
+    /// Unknowns of one mirrored part, and number of the parts, of the coarsest solution that [`IronPull::new`] ends with.
+    #[must_use]
+    pub fn least_size(iron: &Iron, tolerance: f64) -> [usize; 2] {
+        let [first, _] = tiers(iron, tolerance);
+        let surface = iron.surface_for_magnets(first + 1);
+        [surface.size(), iron.images().len()]
     }
 
     /// At one of the [`RESOLUTIONS`]; `None` where the steel's equations have no solution.
