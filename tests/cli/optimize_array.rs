@@ -1,5 +1,8 @@
 //! `optimize --for`: the whole array, for shapes.
 
+use std::collections::BTreeMap;
+
+use fluxform::bundle::sweep::{ArrayRow, PlanFile, PointFile, Row, Status};
 use serde_json::Value;
 
 use crate::SEED;
@@ -552,7 +555,7 @@ fn a_sweep_searches_an_array_for_every_limit() {
         let table = format!("{folder}.d/sweep.csv");
         let merge = ["sweep", "merge", "plan.json", folder, "--out", &table];
         let run = place.run(&merge).ends(0);
-        assert!(run.out.contains("times the given array"), "{}", run.out);
+        assert!(run.out.contains("times its own given array"), "{}", run.out);
         String::from_utf8(place.read(&table)).expect("text")
     };
     let table = merged("whole");
@@ -579,6 +582,77 @@ fn a_sweep_searches_an_array_for_every_limit() {
         "{}",
         refused.err
     );
+}
+
+/// A sweep ranked arrays by their gains, each over the given array of its own point: a swept current that made the given
+/// array weak made its best one the best of all.
+#[test]
+fn regression_a_sweep_ranked_arrays_by_gains_over_different_arrays() {
+    let place = Place::new();
+    let text = place.text(SEED);
+    let search = "[search]\narray.pitch_mm = [38.0, 60.0]\n";
+    place.write("air.toml", &format!("{text}\n{search}"));
+    let plan = ["sweep", "plan", "air.toml", "--for", FLAT];
+    let set = [
+        "--set",
+        "supply.current_max_a=0.7,1.3,2",
+        "--out",
+        "plan.json",
+    ];
+    place.run(&[&plan[..], &set].concat()).ends(0);
+    let plan = PlanFile::parse("plan.json", &place.read("plan.json")).expect("a plan");
+    // The smallest constant would choose the last, the gain the first, the geometric mean the second.
+    let found = [(1.7, [0.3, 0.5]), (0.9, [0.6, 1.9]), (1.3, [0.7, 0.8])];
+    for (index, (gain, lambda_n_per_m)) in (0..).zip(found) {
+        let row = Row {
+            resistance_ohm: 3.0 - 0.7 * index as f64,
+            mass_kg: 0.3,
+            settling_s: 0.01,
+            force_n: 0.1,
+            limits_met: true,
+            array: Some(ArrayRow {
+                gain,
+                lambda_n_per_m: lambda_n_per_m.to_vec(),
+                coils: 9,
+                evaluations: 7,
+                values: BTreeMap::new(),
+            }),
+            ..Row::default()
+        };
+        let point = PointFile::new(&plan.plan_sha256, index, Ok((row, Status::Done)));
+        let bytes = point.to_bytes().expect("a point");
+        let path = format!("points/points/000/{index:06}.json");
+        place.write(&path, std::str::from_utf8(&bytes).expect("text"));
+    }
+    let merge = [
+        "sweep",
+        "merge",
+        "plan.json",
+        "points",
+        "--report",
+        "page.html",
+    ];
+    let merged = place
+        .run(&[&merge[..], &["--plot", "plot.svg"]].concat())
+        .ends(0);
+    for text in [
+        "design 1: supply.current_max_a = 1.3",
+        "1.0677 N/m, 0.9 times its own",
+    ] {
+        assert!(merged.out.contains(text), "{text}: {}", merged.out);
+    }
+    // The heaviest in nothing, the second is on every front; the first is on none.
+    let fronts = place.text("sweep_pareto.csv");
+    let designs: Vec<&str> = fronts.lines().skip(1).map(|row| &row[..1]).collect();
+    assert_eq!(designs, ["1", "2"], "{fronts}");
+    let page = place.text("page.html");
+    for text in [
+        "best in mean force constant and",
+        "<td class=\"n\">1.068 N/m</td>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(place.text("plot.svg").contains("mean force constant"));
 }
 
 /// Six coils in air under a wedge, which tie in pairs by symmetry.

@@ -7,7 +7,7 @@ mod summary;
 mod table;
 
 pub use plan::{ArrayTask, Axis, Mode, POINTS_MAX, PlanFile, Value};
-pub use point::{ArrayRow, IronRow, OptimumRow, PointFile, Row, Status};
+pub use point::{ArrayMerit, ArrayRow, IronRow, OptimumRow, PointFile, Row, Status};
 pub use store::{PointStore, StoredPoint};
 pub use summary::MergeSummary;
 pub use table::{

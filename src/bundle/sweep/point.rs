@@ -102,7 +102,7 @@ pub struct IronRow {
 /// The array that renders the shapes best within a design's limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArrayRow {
-    /// Geometric mean of its force constants over those of the design as given.
+    /// Geometric mean of its force constants over those of the point's own given array.
     pub gain: f64,
     /// Force constant of every shape.
     pub lambda_n_per_m: Vec<f64>,
@@ -112,6 +112,31 @@ pub struct ArrayRow {
     pub evaluations: u64,
     /// Its variables by key, in the key's unit.
     pub values: BTreeMap<String, f64>,
+}
+
+/// How good an array is for the shapes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ArrayMerit {
+    /// Geometric mean of the force constants, N/m, which all points of a sweep share: over one given array it
+    /// ranks as `gain` does. 0 without a shape.
+    pub mean_lambda_n_per_m: f64,
+    /// The same over that of the point's own design as given.
+    pub gain: f64,
+}
+
+impl ArrayRow {
+    /// See [`ArrayMerit`].
+    #[must_use]
+    pub fn merit(&self) -> ArrayMerit {
+        let logs: f64 = self.lambda_n_per_m.iter().map(|lambda| lambda.ln()).sum();
+        ArrayMerit {
+            mean_lambda_n_per_m: match self.lambda_n_per_m.len() {
+                0 => 0.0,
+                shapes => (logs / shapes as f64).exp(),
+            },
+            gain: self.gain,
+        }
+    }
 }
 
 /// Result for a design.

@@ -91,9 +91,11 @@ pub static OPTIMUM_COLUMNS: &[Column] = &[
     of_optimum!("upper_bound_n", Number, best => best.upper_bound_n),
 ];
 
-/// Columns after those of a sweep that searches arrays; `best:KEY` of every variable follow.
+/// Columns after those of a sweep that searches arrays; `best:KEY` of every variable follow. `gain` is against the
+/// row's own given array: rows compare by `mean_lambda_n_per_m`.
 pub static ARRAY_COLUMNS: &[Column] = &[
     of_array!("gain", Number, best => Some(best.gain)),
+    of_array!("mean_lambda_n_per_m", Number, best => Some(best.merit().mean_lambda_n_per_m)),
     of_array!("smallest_lambda_n_per_m", Number, best => best.lambda_n_per_m.iter().copied().reduce(f64::min)),
     of_array!("coils", Count, best => Some(best.coils)),
     of_array!("evaluations", Count, best => Some(best.evaluations)),

@@ -14,8 +14,8 @@ use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::read_bounded::read_plain;
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
-    MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, columns,
-    value_text,
+    ArrayMerit, ArrayRow, MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint,
+    TableWriter, columns, value_text,
 };
 use crate::design::template::Template;
 use crate::numerics::front::front;
@@ -34,7 +34,7 @@ const PORTION: u64 = 4096;
 const SIDECAR_MAX_BYTES: u64 = 1 << 20;
 /// Ranges of missing points that are named.
 const NAMED: usize = 10;
-/// The costs that the force is compared with: name, unit, column of the front's table.
+/// The costs that the ranking quantity is compared with: name, unit, column of the front's table.
 const COSTS: [(&str, &str, &str); 3] = [
     ("resistance", "ohm", "front_resistance"),
     ("mass", "kg", "front_mass"),
@@ -88,22 +88,22 @@ pub struct MergeReport {
     pub missing: String,
     /// The page, if one was requested.
     pub page: Option<String>,
-    /// The force over the keys, if its drawing was requested.
+    /// The ranking quantity over the keys, if its drawing was requested.
     pub landscape: Option<Landscape>,
-    /// The strongest design, of those that meet their limits where there are any.
-    pub best: Option<StrongestDesign>,
+    /// The best design, of those that meet their limits where there are any.
+    pub best: Option<SweepBest>,
 }
 
-/// The strongest design of a sweep.
+/// The best design of a sweep: the strongest, or where arrays are searched the one of the largest mean force constant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StrongestDesign {
+pub struct SweepBest {
     /// Its index in the plan.
     pub index: u64,
     /// The swept keys and their values.
     pub values: Vec<(String, String)>,
-    /// Gain of the best array over the given one; absent where no array is searched.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gain: Option<f64>,
+    /// Force constants of the best array; absent where no array is searched.
+    #[serde(flatten)]
+    pub array: Option<ArrayMerit>,
     /// |force|, N.
     pub force_n: f64,
     /// Resistance, ohm, mass, kg, and settling time, s.
@@ -112,20 +112,20 @@ pub struct StrongestDesign {
     pub limits_met: bool,
 }
 
-impl StrongestDesign {
+impl SweepBest {
     fn of(plan: &PlanFile, briefs: &[Brief]) -> Option<Self> {
         // Of equal ones the first.
-        let stronger = |a: &&Brief, b: &&Brief| {
-            let gain = a.gain.total_cmp(&b.gain);
-            a.met.cmp(&b.met).then(gain).then(b.index.cmp(&a.index))
+        let better = |a: &&Brief, b: &&Brief| {
+            let merit = a.merit().total_cmp(&b.merit());
+            a.met.cmp(&b.met).then(merit).then(b.index.cmp(&a.index))
         };
-        let best = briefs.iter().max_by(stronger)?;
+        let best = briefs.iter().max_by(better)?;
         let keys = plan.axes.iter().map(|axis| axis.key.clone());
         let values = plan.values_at(best.index).into_iter().map(value_text);
         Some(Self {
             index: best.index,
             values: keys.zip(values).collect(),
-            gain: (plan.mode == Mode::OptimizeFor).then_some(best.gain),
+            array: best.array,
             force_n: best.force_n,
             costs: best.costs,
             limits_met: best.met,
@@ -133,14 +133,30 @@ impl StrongestDesign {
     }
 }
 
-/// The few numbers of a point that are held: index, what is made large, force, costs, whether limits
+/// The few numbers of a point that are held: index, force constants of its array, force, costs, whether limits
 /// are met.
 struct Brief {
     index: u64,
-    gain: f64,
+    array: Option<ArrayMerit>,
     force_n: f64,
     costs: [f64; 3],
     met: bool,
+}
+
+impl Brief {
+    /// What ranks it, as [`ranked_by`] names it. A gain ranks nothing: each is over its own given array.
+    fn merit(&self) -> f64 {
+        self.array
+            .map_or(self.force_n, |array| array.mean_lambda_n_per_m)
+    }
+}
+
+/// Name and unit of what ranks a plan's designs.
+fn ranked_by(plan: &PlanFile) -> [&'static str; 2] {
+    match plan.mode {
+        Mode::OptimizeFor => ["mean force constant", "N/m"],
+        Mode::Evaluate | Mode::Optimize | Mode::OptimizeWound => ["force on the magnet", "N"],
+    }
 }
 
 #[derive(Default)]
@@ -407,10 +423,7 @@ impl Gathered {
         if let Some(row) = &point.row {
             self.briefs.push(Brief {
                 index: point.index,
-                gain: row
-                    .array
-                    .as_ref()
-                    .map_or(row.force_n.abs(), |array| array.gain),
+                array: row.array.as_ref().map(ArrayRow::merit),
                 force_n: row.force_n.abs(),
                 costs: [row.resistance_ohm, row.mass_kg, row.settling_s],
                 met: row.limits_met,
@@ -474,7 +487,7 @@ fn fronts(briefs: &[Brief]) -> ([Vec<usize>; 3], bool) {
     let fronts = std::array::from_fn(|cost| {
         let points: Vec<[f64; 2]> = competing
             .iter()
-            .map(|at| [briefs[*at].costs[cost], briefs[*at].gain])
+            .map(|at| [briefs[*at].costs[cost], briefs[*at].merit()])
             .collect();
         front(&points).into_iter().map(|at| competing[at]).collect()
     });
@@ -507,15 +520,12 @@ fn plot(
             front: fronts[cost].clone(),
         }
     };
-    let (gain, gain_unit) = match plan.mode {
-        Mode::OptimizeFor => ("force constants, relative", ""),
-        Mode::Evaluate | Mode::Optimize | Mode::OptimizeWound => ("force on the magnet", "N"),
-    };
+    let [gain, gain_unit] = ranked_by(plan);
     ParetoPlot {
         title: format!("{}: {} designs", plan.design, briefs.len()),
         gain,
         gain_unit,
-        gains: briefs.iter().map(|brief| brief.gain).collect(),
+        gains: briefs.iter().map(Brief::merit).collect(),
         limits_met: briefs.iter().map(|brief| brief.met).collect(),
         front: if among_met {
             "best of those that meet them"
@@ -567,7 +577,7 @@ fn report(
     gathered: &Gathered,
     page: Option<String>,
 ) -> MergeReport {
-    let best = StrongestDesign::of(plan, &gathered.briefs);
+    let best = SweepBest::of(plan, &gathered.briefs);
     let landscape = || landscape::landscape(plan, &gathered.briefs, best.as_ref());
     MergeReport {
         summary,

@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::merge::{
-    MergeFiles, MergeReport, MergeRequest, StrongestDesign, check_drawable, merge, merge_table,
+    MergeFiles, MergeReport, MergeRequest, SweepBest, check_drawable, merge, merge_table,
 };
 use crate::RunError;
 use crate::bundle::atomic::check_distinct;
@@ -27,7 +27,9 @@ use crate::cli::values::{self, FileArgument};
 /// Writes one row per point, in the order of the plan, to a CSV table; beside it NAME.svg, force
 /// against resistance, mass and settling time with the designs that no other one beats,
 /// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
-/// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
+/// meet their limits, if any does. Those of a plan with --for are ranked and drawn by the geometric mean of their
+/// shapes' force constants (column mean_lambda_n_per_m) instead of the force; the column gain is over each row's
+/// own given array, which the set keys may change. Missing points are named and end with exit code 4 and no table,
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
 /// warning; a table with fewer missing is replaced with --force alone. Points of another plan are refused.
 #[derive(Debug, Args)]
@@ -56,7 +58,8 @@ pub struct Merge {
     /// Draw the force over the plan's one key, or over its two (.svg, .png or .pdf)
     ///
     /// As a curve, or as a map of colours: hatched are designs that break a limit, white those that are
-    /// missing or cannot be computed; a star is the strongest within its limits.
+    /// missing or cannot be computed; a star is the strongest within its limits. Of a plan with --for the
+    /// mean force constant is drawn instead.
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,
     #[command(flatten)]
@@ -69,9 +72,9 @@ struct MergeJson<'a> {
     #[serde(flatten)]
     summary: &'a MergeSummary,
     table: String,
-    /// The strongest design, of those that meet their limits where there are any.
+    /// The best design, of those that meet their limits where there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
-    best: Option<&'a StrongestDesign>,
+    best: Option<&'a SweepBest>,
 }
 
 impl Merge {
@@ -179,7 +182,7 @@ impl Merge {
         let rows = count(summary.rows as usize, "design");
         let mut sheet = Sheet::new(&format!("{}: a sweep of {rows}", summary.design));
         if let Some(best) = &report.best {
-            sheet.line("best", &strongest(best));
+            sheet.line("best", &best_design(best));
         }
         let mut line = format!("{} meet their limits", summary.limits_met);
         if summary.failed > 0 {
@@ -220,17 +223,21 @@ impl Merge {
     }
 }
 
-/// The strongest design and what it costs.
-fn strongest(best: &StrongestDesign) -> String {
+/// The best design and what it costs.
+fn best_design(best: &SweepBest) -> String {
     let [resistance_ohm, mass_kg, settling_s] = best.costs;
     let values: Vec<String> = best
         .values
         .iter()
         .map(|(key, value)| format!("{key} = {value}"))
         .collect();
-    let (achieved, strongest) = match best.gain {
-        Some(gain) => (
-            format!("{} times the given array", number(gain)),
+    let (achieved, first) = match best.array {
+        Some(array) => (
+            format!(
+                "mean force constant {}, {} times its own given array's",
+                si(array.mean_lambda_n_per_m, "N/m"),
+                number(array.gain)
+            ),
             "the best for the shapes",
         ),
         None => (force(best.force_n), "the strongest"),
@@ -241,7 +248,7 @@ fn strongest(best: &StrongestDesign) -> String {
         "; none meets its limits"
     };
     format!(
-        "design {}: {}\n{}, {}, {}, settled after {}: {strongest}{among}",
+        "design {}: {}\n{}, {}, {}, settled after {}: {first}{among}",
         best.index,
         values.join(", "),
         achieved,

@@ -5,10 +5,11 @@ use serde_json::{Map, Value, json};
 use super::frame::{Page, Section, figure, foot};
 use super::html::Html;
 use super::inputs::sources;
-use super::number::{force, si};
+use super::number::{figures, force, si};
 use super::pack::f32s;
 use crate::plot::pareto::ParetoPlot;
 use fluxform_bundle::artefact::Input;
+use fluxform_bundle::sweep::ArrayMerit;
 
 /// Designs that are listed; the table beside has all.
 const LISTED: usize = 200;
@@ -45,6 +46,8 @@ pub struct BestDesign {
     pub index: u64,
     /// Its values of the keys that vary, as text.
     pub values: Vec<String>,
+    /// Absent where no array was searched.
+    pub array: Option<ArrayMerit>,
     /// N.
     pub force_n: f64,
     /// ohm, kg, s.
@@ -150,10 +153,23 @@ fn answer(facts: &SweepFacts) -> Section {
     for key in &facts.keys {
         body.element("th scope=\"col\" class=\"n\"", key);
     }
-    for head in ["force", "resistance", "mass", "settling"] {
+    let for_shapes = facts.best.iter().any(|one| one.array.is_some());
+    let of_shapes: &[&str] = if for_shapes {
+        &[facts.plot.gain, "gain"]
+    } else {
+        &[]
+    };
+    for head in of_shapes
+        .iter()
+        .chain(&["force", "resistance", "mass", "settling"])
+    {
         body.element("th scope=\"col\" class=\"n\"", head);
     }
-    body.raw("<th scope=\"col\">best in gain and</th></tr></thead><tbody>");
+    body.element(
+        "th scope=\"col\"",
+        &format!("best in {} and", facts.plot.gain),
+    )
+    .raw("</tr></thead><tbody>");
     for one in facts.best.iter().take(LISTED) {
         row(&mut body, one);
     }
@@ -161,6 +177,11 @@ fn answer(facts: &SweepFacts) -> Section {
     if facts.best.len() > LISTED {
         let text = format!("The first {LISTED}; the table beside the sweep has all.");
         body.element("p class=\"note\"", &text);
+    }
+    if for_shapes {
+        let text = "The mean force constant, the geometric mean over the shapes, ranks the designs. The gain is over that of \
+                    the design's own given array, which the keys may change: gains of two designs need not compare.";
+        body.element("p class=\"note\"", text);
     }
     Section {
         id: "answer",
@@ -174,6 +195,10 @@ fn row(body: &mut Html, one: &BestDesign) {
         .element("th scope=\"row\"", &one.index.to_string());
     for value in &one.values {
         body.element("td class=\"n\"", value);
+    }
+    if let Some(array) = one.array {
+        body.element("td class=\"n\"", &si(array.mean_lambda_n_per_m, "N/m"))
+            .element("td class=\"n\"", &figures(array.gain, 4));
     }
     let [resistance, mass, settling] = one.costs;
     for text in [

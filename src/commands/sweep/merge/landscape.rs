@@ -1,6 +1,6 @@
-//! The force of a sweep's designs over its one or two keys.
+//! What ranks a sweep's designs over its one or two keys.
 
-use super::{Brief, StrongestDesign};
+use super::{Brief, SweepBest, ranked_by};
 use crate::RunError;
 use crate::bundle::sweep::{Axis, PlanFile, value_text};
 use crate::plot::landscape::{Landscape, Variable};
@@ -16,7 +16,7 @@ pub(crate) fn check_drawable(plan: &PlanFile) -> Result<(), RunError> {
     let keys = plan.axes.len();
     if !(1..=2).contains(&keys) {
         return Err(RunError::Sweep(format!(
-            "--plot draws the force over one key or two, this plan has {keys}; plan the others apart, or see \
+            "--plot draws over one key or two, this plan has {keys}; plan the others apart, or see \
              the plot beside the table"
         )));
     }
@@ -35,11 +35,7 @@ pub(crate) fn check_drawable(plan: &PlanFile) -> Result<(), RunError> {
 }
 
 /// The drawing; the first key is along x.
-pub(super) fn landscape(
-    plan: &PlanFile,
-    briefs: &[Brief],
-    best: Option<&StrongestDesign>,
-) -> Landscape {
+pub(super) fn landscape(plan: &PlanFile, briefs: &[Brief], best: Option<&SweepBest>) -> Landscape {
     let columns = plan.axes.first().map_or(1, |axis| axis.values.len());
     let rows = plan.axes.get(1).map(|axis| axis.values.len());
     // The last key is fastest in the plan.
@@ -51,20 +47,23 @@ pub(super) fn landscape(
     let (mut values, mut met) = (vec![None; count], vec![false; count]);
     for brief in briefs {
         let [column, row] = place(brief.index);
-        values[row * columns + column] = Some(brief.force_n);
+        values[row * columns + column] = Some(brief.merit());
         met[row * columns + column] = brief.met;
     }
     let variable = |axis: &Axis| Variable {
         name: axis.key.clone(),
         labels: axis.values.iter().map(value_text).collect(),
     };
-    let named = |best: &StrongestDesign| match best.limits_met {
-        true => "strongest within its limits",
-        false => "strongest; none meets its limits",
+    let named = |best: &SweepBest| {
+        let first = best.array.map_or("strongest", |_| "best");
+        match best.limits_met {
+            true => format!("{first} within its limits"),
+            false => format!("{first}; none meets its limits"),
+        }
     };
     Landscape {
         title: format!("{}: {} designs", plan.design, briefs.len()),
-        quantity: ["force on the magnet", "N"],
+        quantity: ranked_by(plan),
         across: plan.axes.first().map_or_else(Variable::default, variable),
         up: plan.axes.get(1).map(variable),
         values,
@@ -72,7 +71,7 @@ pub(super) fn landscape(
         limits: Vec::new(),
         best: best.map(|best| {
             let at = place(best.index).map(|k| k as f64);
-            (at, named(best).to_owned())
+            (at, named(best))
         }),
         section: None,
     }

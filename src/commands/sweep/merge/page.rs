@@ -23,6 +23,7 @@ pub(super) fn html(
         designs.push(BestDesign {
             index: *index,
             values: plan.values_at(*index).into_iter().map(value_text).collect(),
+            array: brief.array,
             force_n: brief.force_n,
             costs: brief.costs,
             on: *on,
