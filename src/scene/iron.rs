@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Scene;
 use super::core_material::{Material, SceneCore};
+use super::knee::above_knee;
 use super::named_files::{self, NamedContent};
 use super::passive_table::Turn;
 use crate::RunError;
@@ -27,6 +28,8 @@ const LEAST_GAP: f64 = 0.01;
 /// Depth below the surface at which the largest |B| is looked for, and its largest part of a thickness, m.
 const DEPTH_M: f64 = 1e-3;
 const DEPTH_PART: f64 = 0.1;
+/// Advice on steel above its knee.
+const THICKER: &str = "make the steel thicker, or lower the current";
 
 /// The steel of a design beyond its cores.
 #[derive(Debug, Clone)]
@@ -270,13 +273,18 @@ impl SceneIron {
             .core
             .as_ref()
             .map_or(f64::INFINITY, |core| core.knee_t);
-        let largest = |a: Peak, b: &Peak| if b.field_t > a.field_t { *b } else { a };
-        let core = peaks.cores.iter().fold(Peak::default(), largest);
-        let core = above_knee(core, of_core, &format!("a core of the array at {at}"));
+        let known = |peak: &Peak| (peak.field_t, peak.error_t.unwrap_or(0.0));
+        let core = above_knee(
+            peaks.cores.iter().map(known),
+            of_core,
+            &format!("a core of the array at {at}"),
+            THICKER,
+        );
         let plate = above_knee(
-            peaks.elsewhere,
+            [known(&peaks.elsewhere)],
             self.knee_t,
             &format!("the plate or [[iron]] at {at}"),
+            THICKER,
         );
         let put_right = self.put_right.iter().cloned();
         put_right.chain(core).chain(plate).collect()
@@ -342,26 +350,6 @@ fn chi(steel: LinearSteel) -> f64 {
     steel.relative_permeability - 1.0
 }
 
-/// A sentence where the peak, or what its error allows, lies above the knee.
-fn above_knee(peak: Peak, knee_t: f64, whose: &str) -> Option<String> {
-    let (peak_t, error_t) = (peak.field_t, peak.error_t.unwrap_or(0.0));
-    let reaches = format!("{whose} reaches {peak_t:.2} T, +/- {error_t:.2} T,");
-    let advice = "make the steel thicker, or lower the current";
-    if peak_t > knee_t {
-        Some(format!(
-            "{reaches} above the steel's knee at {knee_t} T, but is taken as linear: the force will be smaller \
-             than stated; {advice}"
-        ))
-    } else if peak_t + error_t > knee_t {
-        Some(format!(
-            "{reaches} which may be above the steel's knee at {knee_t} T, but is taken as linear: a smaller \
-             --tolerance says more; {advice}"
-        ))
-    } else {
-        None
-    }
-}
-
 pub(super) fn middle(axes: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|axis| {
         let ends = axes
@@ -425,25 +413,4 @@ fn bodies_of(
 fn place_mm(place_m: Point) -> String {
     let [x, y, z] = place_m.map(|c| 1e3 * c + 0.0);
     format!("({x:.3}, {y:.3}, {z:.3}) mm")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_peak_warns_as_far_as_its_error_reaches() {
-        let said = |field_t, error_t| {
-            let peak = Peak {
-                field_t,
-                place_m: [0.0; 3],
-                error_t,
-            };
-            above_knee(peak, 1.5, "a plate")
-        };
-        assert_eq!(said(1.37, Some(0.1)), None);
-        assert!(said(1.37, Some(0.17)).unwrap().contains("may be above"));
-        let above = said(1.63, Some(0.17)).unwrap();
-        assert!(above.contains("1.63 T, +/- 0.17 T, above"), "{above}");
-    }
 }

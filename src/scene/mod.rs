@@ -9,6 +9,7 @@ pub mod evaluation_sample;
 pub mod felt_force;
 pub mod field_slice;
 pub mod iron;
+pub(crate) mod knee;
 pub mod maps;
 pub mod named_files;
 pub mod neighbours;

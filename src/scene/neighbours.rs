@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::iron::middle;
+use super::knee::{FOR_CORES, above_knee};
 use super::rated::Rated;
-use super::single::above_knee;
 use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
 use super::{Scene, passive, steel};
@@ -207,12 +207,14 @@ fn array(
         let inside = array.core_fields(&scene.upper_a, depth_m)?;
         peak_t = inside.iter().map(|field| field.peak_t).collect();
         mean_t = inside.iter().map(|field| field.mean_t).collect();
-        let most_t = peak_t.iter().copied().fold(0.0, f64::max);
         let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
         warnings.extend(above_knee(
-            most_t,
+            inside
+                .iter()
+                .map(|field| (field.peak_t, field.peak_error * field.peak_t)),
             knee_t,
             "a core of the array with all coils at their rated currents",
+            FOR_CORES,
         ));
     }
     let iron = match solved.iron_peaks(scene, &scene.upper_a)? {

@@ -5,6 +5,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 use super::core_material::{Material, SceneCore};
+use super::knee::{FOR_CORES, above_knee};
 use super::tolerances::MAGNET_FINEST;
 use super::{MAGNET_SHARE, Scene, at_current, passive};
 use crate::RunError;
@@ -261,9 +262,10 @@ impl Single {
         let mut warnings = core.warnings.clone();
         if matches!(core.material, Material::Linear(_)) {
             warnings.extend(above_knee(
-                inside.peak_t,
+                [(inside.peak_t, inside.peak_error * inside.peak_t)],
                 core.knee_t,
                 "the core at the rated current",
+                FOR_CORES,
             ));
         }
         Ok(Self {
@@ -414,14 +416,4 @@ impl Single {
             Source::Saturated(winding, core) => winding.field(r_m, z_m)? + core.field(r_m, z_m),
         })
     }
-}
-
-/// A sentence on steel that is taken as linear where it is not.
-pub(crate) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String> {
-    (peak_t > knee_t).then(|| {
-        format!(
-            "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as \
-             linear: the force will be smaller than stated; give core.bh_curve, or lower the current"
-        )
-    })
 }

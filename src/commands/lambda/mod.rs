@@ -45,8 +45,8 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::core_material::Material;
+use crate::scene::knee::{FOR_CORES, above_knee};
 use crate::scene::passive;
-use crate::scene::single::above_knee;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
 use crate::scene::steel::Solved;
@@ -608,9 +608,10 @@ impl PosedProblem<'_> {
         {
             let peak_t = self.field.peak_t(array, &chosen.currents_a)?;
             warnings.extend(above_knee(
-                peak_t,
+                [(peak_t, array.relative_error * peak_t)],
                 core.knee_t,
                 "a core of the array at the chosen currents",
+                FOR_CORES,
             ));
         }
         Ok(warnings)
