@@ -1,4 +1,8 @@
-//! The end of every help page: exit codes and examples.
+//! The end of every help page, exit codes and examples, and what several pages say.
+
+/// Help of `--evaluations`.
+pub const EVALUATIONS: &str = "With --for: most arrays that the search for a design computes; what limits and trade-offs \
+                               around the best are worth takes more";
 
 /// The exit codes that a command can end with in addition to 0 and 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -58,6 +58,21 @@ fn every_command_explains_itself() {
     );
 }
 
+/// `sweep plan` called the number the most that is computed; up to eighteen times as many were.
+#[test]
+fn the_searches_of_arrays_say_the_same_of_their_evaluations() {
+    let place = Place::new();
+    for path in [&["optimize"][..], &["sweep", "plan"]] {
+        let page = help_of(
+            &place,
+            &path.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        );
+        let words: Vec<&str> = page.split_whitespace().collect();
+        let expected = "the search for a design computes; what limits and trade-offs around the best are worth takes more";
+        assert!(words.join(" ").contains(expected), "{path:?}");
+    }
+}
+
 /// Texts and comments name flags as `` `command --flag` ``.
 #[test]
 fn every_flag_that_a_text_names_is_one() {

@@ -15,7 +15,7 @@ use crate::bundle::write::write_json;
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
-use crate::cli::help::{Codes, page};
+use crate::cli::help::{Codes, EVALUATIONS, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
@@ -63,8 +63,7 @@ pub struct Plan {
     /// Search the array that renders these shapes best, as `optimize --for` does
     #[arg(long = "for", value_name = "SHAPE", num_args = 1..)]
     shapes: Vec<PathBuf>,
-    /// With --for: most arrays that the search of each design computes
-    #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations as u32,
+    #[arg(long, help = EVALUATIONS, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,
     /// Where random numbers begin, together with a point's index; evaluating draws none

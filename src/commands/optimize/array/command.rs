@@ -15,6 +15,7 @@ use crate::bundle::atomic::{Overwrite, check_distinct};
 use crate::cli::args::SurfaceFlags;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
+use crate::cli::help::EVALUATIONS;
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::{begin, write_to};
@@ -59,8 +60,8 @@ pub struct ArrayFlags {
     /// Make the smallest of the shapes' gains large, not their mean
     #[arg(long, hide_short_help = true, requires = "shapes")]
     pub smallest: bool,
-    /// Most arrays that the search computes; what limits and trade-offs around the best are worth takes more
-    #[arg(long, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
+    /// Most arrays of the search.
+    #[arg(long, help = EVALUATIONS, hide_short_help = true, value_name = "N", requires = "shapes", default_value_t = Settings::default().evaluations)]
     pub evaluations: usize,
     /// Write the trade-offs against mass, heat, settling and number of coils here (CSV); every number of coils is
     /// then searched to its end, and for each of these costs
