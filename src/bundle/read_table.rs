@@ -45,6 +45,14 @@ fn whole(name: &str, source: impl Read) -> Result<Vec<u8>, TableError> {
     if text.starts_with(b"\xef\xbb\xbf") {
         text.drain(..3);
     }
+    // A spreadsheet's "Unicode text"; without a mark every letter of the header has a byte of zeros.
+    let header = text.split(|byte| *byte == b'\n').next().unwrap_or(&[]);
+    if text.starts_with(b"\xff\xfe") || text.starts_with(b"\xfe\xff") || header.contains(&0) {
+        let fault = format!(
+            "{name}:1: the text is not UTF-8 but UTF-16, or no text; save the table as text: CSV in UTF-8"
+        );
+        return Err(TableError::one(fault));
+    }
     Ok(text)
 }
 

@@ -142,6 +142,19 @@ const MISTAKES: &[Mistake] = &[
         &["column x_m", "write a decimal point, 0.1"],
     ),
     (
+        &["probe", SEED, "marked.csv"],
+        3,
+        &[
+            "marked.csv:1: the text is not UTF-8 but UTF-16",
+            "CSV in UTF-8",
+        ],
+    ),
+    (
+        &["probe", SEED, "unmarked.csv"],
+        3,
+        &["unmarked.csv:1: the text is not UTF-8 but UTF-16"],
+    ),
+    (
         &["probe", SEED, "empty.csv"],
         3,
         &["the table is empty", "x_m,y_m,z_m"],
@@ -246,6 +259,21 @@ fn prepared() -> Place {
     table("tabs.csv", "x_m\ty_m\tz_m\n0.1\t0.2\t0.3\n");
     table("commas.csv", "x_m,y_m,z_m\n0,1,0,2,0,3\n");
     table("quoted.csv", "x_m,y_m,z_m\n\"0,1\",0.2,0.3\n");
+    for (name, text, order) in [
+        (
+            "marked.csv",
+            "\u{feff}x_m,y_m,z_m\r\n0.1,0.2,0.3\r\n",
+            u16::to_le_bytes as fn(u16) -> [u8; 2],
+        ),
+        (
+            "unmarked.csv",
+            "x_m,y_m,z_m\r\n0.1,0.2,0.3\r\n",
+            u16::to_be_bytes,
+        ),
+    ] {
+        let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
+        place.write(name, &bytes);
+    }
     table("empty.csv", "");
     table("header.csv", "x_m,y_m,z_m\n");
     table(
