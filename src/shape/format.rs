@@ -75,7 +75,7 @@ const TABLE: &[Row] = &[
 ];
 
 /// Files that users have, which are not read: their endings, and what to do.
-const ADVICE: [(&[&str], &str); 5] = [
+const ADVICE: [(&[&str], &str); 6] = [
     (
         &["igs", "iges"],
         "IGES files are not read: they hold loose faces, no body; save the body as STEP, or as STL \
@@ -111,6 +111,10 @@ const ADVICE: [(&[&str], &str); 5] = [
     (
         &["tif", "tiff", "asc", "dem", "xyz", "pcd", "las", "laz"],
         "such files are not read: save heights as a PNG of 16 bit grey, or points as a mesh",
+    ),
+    (
+        &["zip", "7z", "rar", "tar", "gz", "tgz", "xz"],
+        "archives are not read: unpack it first, and name the surface in it",
     ),
 ];
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::archive::Archive;
 use crate::bodies::BodyOptions;
 use crate::error::ShapeError;
 use crate::file_mesh::FileMesh;
@@ -81,17 +82,26 @@ impl SurfaceFormat {
         }
         let result = self.reader().1(bytes);
         // A file of another format under this name fails somewhere: the name is the fault then.
-        if result.is_err()
-            && !self.reader().0(bytes)
-            && let Some(format) = Self::of_content(bytes)
-        {
-            return Err(other(&format!(
-                "file but {} file: give it the ending .{}",
-                format.article(),
-                format.usual_ending()
-            )));
+        if result.is_err() && !self.reader().0(bytes) {
+            if let Some(format) = Self::of_content(bytes) {
+                return Err(other(&format!(
+                    "file but {} file: give it the ending .{}",
+                    format.article(),
+                    format.usual_ending()
+                )));
+            }
+            if Archive::is(bytes) && !self.may_be_zip() {
+                return Err(other(
+                    "file but a ZIP archive: unpack it first, and name the surface in it",
+                ));
+            }
         }
         result
+    }
+
+    /// Whether its files may be ZIP archives; their readers say what a damaged one lacks.
+    fn may_be_zip(self) -> bool {
+        matches!(self, Self::ThreeMf | Self::Amf | Self::ThreeDxml)
     }
 
     /// Its name with an article.

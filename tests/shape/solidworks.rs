@@ -8,6 +8,7 @@ use fluxform_shape::file_mesh::FileMesh;
 use crate::formats::{read, refusal};
 use fluxform_testing::surface_files::{
     assembly, display_lists, sldprt, sldprt_assembly, sldprt_blocks, sldprt_compound, sldprt_of,
+    zipped,
 };
 
 fn mesh_of(bytes: &[u8]) -> FileMesh {
@@ -37,6 +38,24 @@ fn a_damaged_native_part_is_refused() {
         ole.contains("damaged") && ole.contains("save the body as STEP"),
         "{ole}"
     );
+}
+
+/// A packed part was advised to be opened in SOLIDWORKS.
+#[test]
+fn regression_a_zip_archive_was_a_part_without_its_sign() {
+    let bytes = zipped(&[("part.txt", "no part")]);
+    for format in [SurfaceFormat::Sldprt, SurfaceFormat::Stl] {
+        let message = refusal(format, &bytes);
+        assert!(
+            message.contains("ZIP archive: unpack it first"),
+            "{message}"
+        );
+    }
+    // What is an archive itself lacks its part.
+    let message = refusal(SurfaceFormat::ThreeMf, &bytes);
+    assert!(!message.contains("unpack it"), "{message}");
+    let advice = SurfaceFormat::advice(Path::new("part.ZIP")).unwrap();
+    assert!(advice.contains("unpack it first"), "{advice}");
 }
 
 const LISTS: &str = "Contents/DisplayLists";
