@@ -169,6 +169,25 @@ fn a_core_above_its_knee_is_warned_of() {
     assert!(!low.err.contains("warning"), "{}", low.err);
 }
 
+/// `lambda` compared coupled cores alone with their knee.
+#[test]
+fn regression_lambda_was_silent_about_cores_that_are_not_coupled() {
+    let place = Place::new();
+    let shipped = String::from_utf8(place.read(CORED)).unwrap();
+    let knee = |text: &str| text.replace("[core]", "[core]\nknee_t = 0.1");
+    let alone = shipped.replace("[array]", "[array]\ncoupling = \"none\"");
+    let one = shipped.replace("rows = 3", "rows = 1");
+    let one = one.replace("columns = 3", "columns = 1");
+    for text in [knee(&alone), knee(&one)] {
+        place.write("design.toml", &text);
+        let ran = place.run(&["lambda", "design.toml", "shapes/flat.toml"]);
+        ran.says(&["the array at the chosen currents", "knee at 0.1 T"]);
+    }
+    place.write("design.toml", &alone);
+    let below = place.run(&["lambda", "design.toml", "shapes/flat.toml"]);
+    assert!(!below.err.contains("knee"), "{}", below.err);
+}
+
 #[test]
 fn the_steel_s_part_is_in_the_summary() {
     let place = Place::new();

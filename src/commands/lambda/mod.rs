@@ -36,6 +36,7 @@ use crate::bundle::artefact::Input;
 use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
+use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::force_direction::{ForceOverride, RequestedForce};
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Jnd, Precision, Settings, Solution, Status, Wiring};
@@ -44,7 +45,7 @@ use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::core_material::Material;
+use crate::scene::core_material::{Material, SceneCore};
 use crate::scene::knee::{FOR_CORES, above_knee};
 use crate::scene::passive;
 use crate::scene::sources::Sampling;
@@ -602,18 +603,33 @@ impl PosedProblem<'_> {
             return Ok(Vec::new());
         };
         let mut warnings = core.warnings.clone();
-        let coupled = self.solved.steel().coupled();
-        if let (Some(chosen), Some(array)) = (&solution.chosen, coupled)
-            && matches!(core.material, Material::Linear(_))
-        {
-            let peak_t = self.field.peak_t(array, &chosen.currents_a)?;
+        if let (Some(chosen), Material::Linear(_)) = (&solution.chosen, &core.material) {
+            let (peak_t, error) = self.core_peak_t(core, &chosen.currents_a)?;
             warnings.extend(above_knee(
-                [(peak_t, array.relative_error * peak_t)],
+                [(peak_t, error * peak_t)],
                 core.knee_t,
                 "a core of the array at the chosen currents",
                 FOR_CORES,
             ));
         }
         Ok(warnings)
+    }
+
+    /// The largest |B| in a core at these currents, T, and its estimated error, relative.
+    fn core_peak_t(&self, core: &SceneCore, currents_a: &[f64]) -> Result<(f64, f64), RunError> {
+        let steel = self.solved.steel();
+        if let Some(array) = steel.coupled() {
+            return Ok((self.field.peak_t(array, currents_a)?, array.relative_error));
+        }
+        let Some(alone) = steel.alone() else {
+            return Ok((0.0, 0.0));
+        };
+        let most_a = currents_a.iter().fold(0.0_f64, |most, i| most.max(i.abs()));
+        let (winding, depth_m) = (&self.scene.winding, peak_depth_m(core.shape));
+        let inside = alone.layer.core_field(winding, most_a, depth_m)?;
+        Ok((
+            inside.peak_t,
+            inside.peak_error.max(self.solved.steel_error),
+        ))
     }
 }

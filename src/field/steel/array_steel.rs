@@ -50,6 +50,11 @@ pub trait ArraySteel {
         None
     }
 
+    /// A core that answers to its own winding alone.
+    fn alone(&self) -> Option<&AloneCore> {
+        None
+    }
+
     /// Whether steel answers to other windings than its own.
     fn couples(&self) -> bool {
         self.coupled().is_some() || self.iron().is_some()
@@ -144,6 +149,10 @@ impl ArraySteel for AloneCore {
         } else {
             TWO_OF_ONE_CORE
         })
+    }
+
+    fn alone(&self) -> Option<&AloneCore> {
+        Some(self)
     }
 }
 

@@ -106,6 +106,47 @@ fn allowed_depth_m(shape: CoreShape, depth_m: f64) -> f64 {
     depth_m.min(DEEPEST * shape.radius_m.min(shape.length_m()))
 }
 
+impl MagnetizedCore {
+    /// |B| in a core that answers to `winding` alone, at `current_a`, as [`CoredCoil::core_field`] has it; of its errors
+    /// those that a coarser solution shows are not known here.
+    ///
+    /// # Errors
+    /// A point on the winding's edge: the core is not in the bore.
+    pub fn core_field(
+        &self,
+        winding: &Winding,
+        current_a: f64,
+        depth_m: f64,
+    ) -> Result<CoreField, OnEdge> {
+        self.inside(winding, current_a, depth_m, LOST_ALONE, VOLUME.order)
+    }
+
+    fn inside(
+        &self,
+        winding: &Winding,
+        current_a: f64,
+        depth_m: f64,
+        lost_counts: f64,
+        order: usize,
+    ) -> Result<CoreField, OnEdge> {
+        let density = self.density_a();
+        let core = Core {
+            layers: DMatrix::from_column_slice(density.len(), 1, density) * current_a,
+            current_a,
+            position_m: [0.0, 0.0],
+        };
+        let fields = core_fields(
+            self.outline(),
+            winding,
+            &[core],
+            depth_m,
+            lost_counts,
+            order,
+        )?;
+        Ok(fields[0])
+    }
+}
+
 impl CoredCoil {
     /// |B| in the core at `current_a`; the largest at least `depth_m` below the surface.
     ///
@@ -115,22 +156,14 @@ impl CoredCoil {
     /// # Errors
     /// A point on the winding's edge: the core is not in the bore.
     pub fn core_field(&self, current_a: f64, depth_m: f64) -> Result<CoreField, OnEdge> {
-        let outline = self.core.outline();
-        let shape = outline.shape;
-        let density = self.core.density_a();
-        let layers = DMatrix::from_column_slice(density.len(), 1, density) * current_a;
-        let core = Core {
-            layers,
-            current_a,
-            position_m: [0.0, 0.0],
-        };
+        let shape = self.core.outline().shape;
         let lost_counts = if self.coarser.is_some() {
             LOST_BESIDE_DIFFERENCE
         } else {
             LOST_ALONE
         };
         let order = volume_order(self.relative_error);
-        let field = core_fields(outline, &self.winding, &[core], depth_m, lost_counts, order)?[0];
+        let field = (self.core).inside(&self.winding, current_a, depth_m, lost_counts, order)?;
         // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
         let differs = match &self.coarser {
             Some(coarser) => {
