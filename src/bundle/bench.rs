@@ -75,8 +75,9 @@ pub struct Reference {
     pub places: u64,
     /// The force constant, N/m.
     pub lambda_n_per_m: f64,
-    /// Its own error, about: what half as many points along each axis change; null where they are
-    /// on no grid. It is added to a run's error before that is held against a target.
+    /// Its own error, about: what half as many points along each axis change, and what its field may still be
+    /// off by, from the change between the present field and its own; null where the points are on no grid.
+    /// It is added to a run's error before that is held against a target.
     pub lambda_error: Option<f64>,
     /// Processor time, s.
     pub cpu_s: f64,
@@ -151,7 +152,8 @@ pub struct Run {
     /// |lambda / that of the reference - 1|.
     pub lambda_error: Option<f64>,
     /// Estimate of the largest error of the felt force anywhere on the surface, relative to the force that is to
-    /// be felt there: that of the places times a factor for what lies between them.
+    /// be felt there: that of the places, with what the reference's field may be off by there, times a factor for
+    /// what lies between them.
     pub felt_error: Option<f64>,
 }
 

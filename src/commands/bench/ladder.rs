@@ -28,8 +28,10 @@ const TOLERANCES: usize = 4;
 /// Processor time to which ladders are shortened, s.
 const QUICK_S: f64 = 60.0;
 const FULL_S: f64 = 600.0;
-/// A refined solution of steel against the present one, and the forces of its field.
-const REFINED_STEEL: f64 = 8.0;
+/// A refined solution of steel against the present one, beside which it is held.
+const REFINED_STEEL: f64 = 8.0 + 1.0;
+/// Forces in the refined field, in the present one beside it, and force constants.
+const REFINED_FORCES: f64 = 3.0;
 
 /// Processor time of the stages of one run, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -215,7 +217,7 @@ impl Ladders {
         let finest = 4.0 * self.points.last().map_or(1.0, |rung| rung.share);
         let per_tolerance = one(self.seconds.steel_s) + of_points(self.seconds.lambda_s) + maps;
         let reference = REFINED_STEEL * self.seconds.steel_s
-            + finest * (self.seconds.points_s + 2.0 * self.seconds.lambda_s);
+            + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.lambda_s);
         let cpu_s =
             reference + of_points(self.seconds.points_s) + tolerances as f64 * per_tolerance;
         let computations =

@@ -160,8 +160,9 @@ fn measure(
         quick: request.quick,
         error_of: "lambda: relative to the refined run's. Felt force: what the currents give by the \
                    interpolated map against what they give directly in the refined field, relative \
-                   to the force to be felt there; the largest of places of the surface all over the \
-                   maps' cells and up to its rim, times 1.25 for what lies between them"
+                   to the force to be felt there, and what that field may be off by; the largest of places of \
+                   the surface all over the maps' cells and up to its rim, times 1.25 for what lies between \
+                   them"
             .to_owned(),
         timed: "processor time of all threads: steel, points, forces with all force constants, and \
                 the part of the map that the object needs; the median where short enough to repeat"

@@ -7,16 +7,16 @@ use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
 use crate::commands::lambda::ForcesAt;
-use crate::lambda::{self, ForceProblem, Solution, Wiring};
+use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring, lowest_requested_m};
 use crate::map::FieldMap;
 use crate::map::interpolation::SAFETY;
 use crate::progress::Silent;
-use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::felt_force::by_map;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
-use crate::scene::steel;
+use crate::scene::steel::{self, Solved};
+use crate::scene::{Scene, coupled};
 
 /// Tolerance of the refined field in air: the kernel's own rounding.
 const AIR: f64 = 1e-15;
@@ -24,12 +24,126 @@ const AIR: f64 = 1e-15;
 const STEEL: f64 = 0.1;
 /// The tightest tolerance requested of steel.
 const TIGHTEST_STEEL: f64 = 1e-9;
+/// Where the stated error of the refined steel is at most this share of the present one's, the change between them
+/// tells what is left. That of evaluating it follows the tolerance, and tells nothing.
+const CLEARLY_LESS: f64 = 1.0 / 3.0;
+/// What is left of that change at most: of errors that fall to a third, a half. The stated ones often fall by more
+/// than the true ones, so their ratio itself is not relied on.
+const LEFT_OF_CHANGE: f64 = 0.5;
+
+/// The refined field beside the present one, which tells what it may still be off by.
+struct Fields {
+    refined: Solved,
+    /// The present field; `None` where the stated error of the refined one is not clearly less.
+    present: Option<Solved>,
+}
+
+/// Forces in the refined field.
+struct Forces {
+    /// N/A, [place, coil].
+    n_per_a: Vec<f64>,
+    off: ForceError,
+}
+
+/// What forces in the refined field may still be off by.
+enum ForceError {
+    /// A part of the change from these in the present field, N/A, [place, coil].
+    FromPresent(Vec<f64>),
+    /// At every place so much for each coil, N/A: the stated error, relative to its largest force.
+    Stated(Vec<f64>),
+}
+
+impl Fields {
+    fn new(bench: &Bench, tolerance: f64) -> Result<Self, RunError> {
+        let scene = bench.scene;
+        let lowest_m = scene.design.workspace.z_m.from;
+        let solve = |tolerance| {
+            let solved = steel::solve(scene, tolerance, lowest_m)?;
+            bench.check()?;
+            Ok::<Solved, RunError>(solved)
+        };
+        let present = solve(scene.tolerances.map)?;
+        let clearly = |refined: &Solved| refined.steel_error <= CLEARLY_LESS * present.steel_error;
+        let mut refined = solve(tolerance)?;
+        // Two loose tolerances may share a resolution; a core alone is soon solved again.
+        let alone = !coupled(scene.design) && !scene.design.has_iron();
+        let finer = STEEL * tolerance;
+        if alone && finer >= TIGHTEST_STEEL && !clearly(&refined) {
+            refined = solve(finer)?;
+        }
+        let tells = refined.has_steel() && clearly(&refined);
+        Ok(Self {
+            refined,
+            present: tells.then_some(present),
+        })
+    }
+
+    fn forces(&self, bench: &Bench, places_m: &[[f64; 3]]) -> Result<Forces, RunError> {
+        let scene = bench.scene;
+        let of = |solved| scene.forces_n_per_a(solved, places_m, &bench.within());
+        let n_per_a = of(&self.refined)?;
+        let off = match &self.present {
+            Some(present) => ForceError::FromPresent(of(present)?),
+            None => {
+                let mut largest = vec![0.0_f64; scene.coils.len()];
+                for row in n_per_a.chunks_exact(largest.len()) {
+                    for (most, force) in largest.iter_mut().zip(row) {
+                        *most = most.max(force.abs());
+                    }
+                }
+                let error = self.refined.point_error();
+                ForceError::Stated(largest.into_iter().map(|most| error * most).collect())
+            }
+        };
+        Ok(Forces { n_per_a, off })
+    }
+}
+
+impl ForceError {
+    /// Of the force of `currents_a` at the place `row`, whose forces per ampere are `refined`, N.
+    fn at(&self, row: usize, refined: &[f64], currents_a: &[f64]) -> f64 {
+        match self {
+            Self::FromPresent(present_n_per_a) => {
+                let coils = currents_a.len();
+                let present = &present_n_per_a[row * coils..(row + 1) * coils];
+                let change = present.iter().zip(refined).zip(currents_a);
+                let change: f64 = change.map(|((a, b), i)| (a - b) * i).sum();
+                LEFT_OF_CHANGE * change.abs()
+            }
+            Self::Stated(off) => off.iter().zip(currents_a).map(|(f, i)| f * i.abs()).sum(),
+        }
+    }
+
+    /// Of the constant `lambda_n_per_m` of `problem` in the refined field, relative.
+    fn of_constant(
+        &self,
+        problem: &ForceProblem,
+        settings: &Settings,
+        (lambda_n_per_m, currents_a): (f64, &[f64]),
+    ) -> Result<f64, RunError> {
+        Ok(match self {
+            Self::FromPresent(present_n_per_a) => {
+                let present = ForceProblem {
+                    forces_n_per_a: present_n_per_a,
+                    ..*problem
+                };
+                let constant = lambda::constant(&present, settings)?;
+                let change = |constant: f64| (constant / lambda_n_per_m - 1.0).abs();
+                LEFT_OF_CHANGE * constant.map_or(1.0, change)
+            }
+            Self::Stated(_) => {
+                let off_n = self.at(0, &[], currents_a);
+                let lowest_m = lowest_requested_m(problem.height_m);
+                lowest_m.map_or(0.0, |lowest_m| off_n / (lambda_n_per_m * lowest_m))
+            }
+        })
+    }
+}
 
 /// Where the felt force is compared, and the refined field there.
 pub struct Places {
     position_m: Vec<[f64; 3]>,
-    /// N/A, [place, coil].
-    forces_n_per_a: Vec<f64>,
+    forces: Forces,
     moment_a_m2: [f64; 3],
     coils: usize,
     shape: String,
@@ -54,7 +168,7 @@ pub struct Refined {
 
 /// The rows of a force problem.
 struct Rows {
-    forces_n_per_a: Vec<f64>,
+    forces: Forces,
     height_m: Vec<f64>,
     offset_n: Option<Vec<f64>>,
     weights: Option<Vec<f64>>,
@@ -63,7 +177,7 @@ struct Rows {
 impl Rows {
     fn problem<'a>(&'a self, scene: &'a Scene, resistance_ohm: &'a [f64]) -> ForceProblem<'a> {
         ForceProblem {
-            forces_n_per_a: &self.forces_n_per_a,
+            forces_n_per_a: &self.forces.n_per_a,
             height_m: &self.height_m,
             offset_n: self.offset_n.as_deref(),
             weights: self.weights.as_deref(),
@@ -75,9 +189,10 @@ impl Rows {
     }
 }
 
-fn chosen(solution: &Solution) -> Option<f64> {
+fn chosen(solution: &Solution) -> Option<(f64, &[f64])> {
     let point = solution.chosen.as_ref()?;
-    Some(point.lambda_n_per_m).filter(|lambda| *lambda > 0.0)
+    let chosen = (point.lambda_n_per_m, point.currents_a.as_slice());
+    Some(chosen).filter(|(lambda, _)| *lambda > 0.0)
 }
 
 /// Computes it.
@@ -94,16 +209,14 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     } else {
         (STEEL * tightest).max(TIGHTEST_STEEL.min(tightest))
     };
-    let lowest_m = scene.design.workspace.z_m.from;
-    let solved = steel::solve(scene, tolerance, lowest_m)?;
-    bench.check()?;
+    let fields = Fields::new(bench, tolerance)?;
     let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
-    let forces = scene.forces_n_per_a(&solved, &points.positions_m, &bench.within())?;
+    let forces = fields.forces(bench, &points.positions_m)?;
     let pull = passive::counted(scene, &points.positions_m)?;
     let offset_n = pull.map(|pull| pull.forces_z_n(&points.positions_m));
     let weights = Some(points.areas.clone());
     let all = Rows {
-        forces_n_per_a: forces,
+        forces,
         height_m: points.height_m.clone(),
         offset_n,
         weights,
@@ -113,30 +226,32 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     let options = bench.request.lambda.with_jnd_of(&problem)?;
     let settings = &options.settings;
     let solution = lambda::solve(&problem, settings)?;
-    let lambda_n_per_m = chosen(&solution).ok_or_else(|| {
+    let chosen = chosen(&solution).ok_or_else(|| {
         RunError::NoForceConstant(format!(
             "{:?} has no force constant in the refined run, so there is nothing to hold errors \
              against; see `fluxform lambda` on it",
             shape.document.name
         ))
     })?;
-    let own_error = points.error_against_limit(
+    let (lambda_n_per_m, _) = chosen;
+    let of_points = points.error_against_limit(
         lambda_n_per_m,
         (&problem, &problem),
         (&Wiring::default(), settings),
         ForcesAt {
             scene,
-            solved: &solved,
+            solved: &fields.refined,
             field: ShapeField::default(),
             progress: &bench.within(),
         },
     )?;
+    let of_field = all.forces.off.of_constant(&problem, settings, chosen)?;
     let Chosen {
         position_m,
         out_of_reach,
     } = choose(shape, ladders, bench)?;
     let places = Places {
-        forces_n_per_a: scene.forces_n_per_a(&solved, &position_m, &bench.within())?,
+        forces: fields.forces(bench, &position_m)?,
         position_m,
         moment_a_m2: scene.moment_a_m2,
         coils: scene.coils.len(),
@@ -147,9 +262,9 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     Ok(Refined {
         places,
         lambda_n_per_m,
+        own_error: of_points.map(|of_points| of_points + of_field),
         solution,
-        own_error,
-        tolerance,
+        tolerance: fields.refined.tolerance,
         points: points.height_m.len(),
         cpu_s: watch.processor_s(),
         in_air,
@@ -162,7 +277,7 @@ impl Refined {
         let field = if self.in_air {
             "the windings' field to rounding"
         } else {
-            "the field to a tenth of the present tolerance"
+            "the field to a tenth of the present tolerance or less"
         };
         let left_out = match self.places.out_of_reach {
             0 => String::new(),
@@ -184,8 +299,9 @@ impl Refined {
 }
 
 impl Places {
-    /// Largest |force by the map - force directly| of the same currents at the places, relative to the force that
-    /// is to be felt, lambda h, times the factor that stands for what lies between them.
+    /// Largest |force by the map - force directly| of the same currents at the places, and what the latter may be
+    /// off by, relative to the force that is to be felt, lambda h, times the factor that stands for what lies
+    /// between them.
     ///
     /// # Errors
     /// A place outside the map.
@@ -196,11 +312,9 @@ impl Places {
         currents_a: &[f64],
     ) -> Result<f64, RunError> {
         let mut largest = 0.0_f64;
-        for (place, direct) in self
-            .position_m
-            .iter()
-            .zip(self.forces_n_per_a.chunks(self.coils))
-        {
+        let rows = self.forces.n_per_a.chunks(self.coils);
+        for (row, (place, direct)) in self.position_m.iter().zip(rows).enumerate() {
+            let own_n = self.forces.off.at(row, direct, currents_a);
             let by_map = by_map(map, self.moment_a_m2, currents_a, *place).ok_or_else(|| {
                 RunError::Input(format!(
                     "shape {:?}: a place of its surface lies outside the map",
@@ -209,9 +323,9 @@ impl Places {
             })?;
             // A coil that the map leaves out gives no force by it.
             let direct: f64 = direct.iter().zip(currents_a).map(|(f, i)| f * i).sum();
-            let difference = by_map - direct;
-            let target = lambda_n_per_m * place[2];
-            largest = largest.max((difference / target).abs());
+            let off_n = (by_map - direct).abs() + own_n;
+            let target_n = lambda_n_per_m * place[2];
+            largest = largest.max((off_n / target_n).abs());
         }
         Ok(SAFETY * largest)
     }
