@@ -186,3 +186,38 @@ fn the_plan_lists_the_parts_left_out_and_its_cost() {
         assert_eq!(map[axis]["samples"], *planned, "{axis}");
     }
 }
+
+/// Of three points the plan had the pull "up to 3.2 mN"; the bundle of the same run had 3.85 mN.
+#[test]
+fn the_plans_costs_are_those_all_over_the_points() {
+    let place = small();
+    edit(&place, "rows = 1\ncolumns = 2", "rows = 2\ncolumns = 2");
+    place.write(
+        "ball.toml",
+        "name = \"ball\"\nprimitive = \"half-sphere\"\n[points]\nx_mm = [-50, 50, 13]\n\
+         y_mm = [-50, 50, 13]\n",
+    );
+    let args = ["calibrate", "two.toml", "ball.toml", "--explain"];
+    let args = [&args[..], &["--no-report", "--force", "--format", "json"]].concat();
+    let json = place.run(&args).ends(0).json();
+    let pull = |parts: &Value| {
+        let all = parts.as_array().unwrap();
+        let what = "pull of the unpowered steel";
+        all.iter()
+            .find(|part| part["what"] == what)
+            .unwrap()
+            .clone()
+    };
+    let planned_n = pull(&json["plan"]["terms"])["cost"]["force_n"]
+        .as_f64()
+        .unwrap();
+    let bundle = &json["bundles"][0];
+    let why = pull(&bundle["manifest"]["left_out"])["why"].to_string();
+    let (_, stated) = why.split_once("up to ").unwrap();
+    let stated_mn: f64 = stated.split_once(" mN").unwrap().0.parse().unwrap();
+    assert!(
+        (1e3 * planned_n / stated_mn - 1.0).abs() < 0.02,
+        "{planned_n} {why}"
+    );
+    assert_eq!(json["plan"]["cost_points"], bundle["points"]);
+}

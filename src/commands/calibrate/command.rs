@@ -273,9 +273,9 @@ fn explained(plan: &Plan) -> String {
     let mut sheet = Sheet::new("plan");
     for term in &plan.terms {
         let (does, without) = match term.done {
-            Done::Computed => ("computed", "without it up to"),
+            Done::Computed => ("computed", "without it about"),
             Done::Kept => ("kept", ""),
-            Done::LeftOut => ("left out", "costs up to"),
+            Done::LeftOut => ("left out", "costs about"),
         };
         let cost = match term.cost {
             None if term.done == Done::LeftOut => "; what that costs is not known".to_owned(),
@@ -290,15 +290,19 @@ fn explained(plan: &Plan) -> String {
         };
         sheet.line(does, &format!("{}: {}{cost}", term.what, term.why));
     }
+    let points: usize = plan.shapes.iter().map(|shape| shape.points).sum();
+    let mut costs = format!(
+        "are the largest at {} of {}",
+        plan.cost_points,
+        count(points, "point")
+    );
     if plan.cost_coils < plan.coils {
-        sheet.line(
-            "costs",
-            &format!(
-                "are those of the {} coils in the middle of the {}",
-                plan.cost_coils, plan.coils
-            ),
+        costs += &format!(
+            ", of the {} coils in the middle of the {}",
+            plan.cost_coils, plan.coils
         );
     }
+    sheet.line("costs", &costs);
     for shape in &plan.shapes {
         let nodes = |n: [usize; 3]| format!("{} x {} x {}", n[0], n[1], n[2]);
         sheet.line(

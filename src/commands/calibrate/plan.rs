@@ -1,7 +1,7 @@
 //! The plan of `calibrate`: the terms it computes, those it leaves out, and what leaving out costs.
 //!
-//! Costs are found by computing forces at a few points of every shape both ways, of the array's
-//! middle coils alone: the array itself is never solved here.
+//! Costs are found by computing forces at points of every shape both ways, of the array's middle
+//! coils alone: the array itself is never solved here. Of many points they are the largest at some.
 
 use serde::Serialize;
 
@@ -14,6 +14,7 @@ use crate::commands::discretize::{PointsOptions, run_with};
 use crate::commands::map::workspace_grid;
 use crate::design::{Coupling, Design, MagnetModel};
 use crate::field::winding::KERNEL_ERROR;
+use crate::numerics::spread::spread;
 use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
@@ -27,6 +28,9 @@ use crate::shape::points::ConstraintPoints;
 
 /// Most coils of which costs are computed.
 const MIDDLE_COILS: usize = 9;
+/// Most points of all shapes at which costs are computed, but for those at coils' axes: a plan is to be had
+/// at once.
+const COST_POINTS: usize = 256;
 
 /// The computation for a design's shapes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,6 +41,8 @@ pub struct Plan {
     pub coils: usize,
     /// Coils of which the costs of terms are computed: those closest to the array's middle.
     pub cost_coils: usize,
+    /// Points of all shapes at which they are computed; a cost is the largest there, which others may exceed.
+    pub cost_points: usize,
     /// The physics, term by term.
     pub terms: Vec<Term>,
     /// The shapes.
@@ -120,13 +126,15 @@ pub fn plan(
         certify: Certify::No,
         ..PointsOptions::default()
     };
+    let middle = middle_coils(source.design);
+    let most = COST_POINTS.div_ceil(shapes.len().max(1));
     let mut places = Vec::new();
     let mut planned = Vec::new();
     for shape in shapes {
         let report = run_with(&shape.document, Vec::new(), &heights, progress)?;
         let points = &report.discretized.points;
         let grid = needed_nodes(source.design, points, options.reach_m);
-        places.extend(telling(points));
+        places.extend(cost_places(points, &middle, most));
         planned.push(ShapePlan {
             shape: shape.document.name.clone(),
             points: points.len(),
@@ -140,44 +148,51 @@ pub fn plan(
     Ok(Plan {
         coils,
         cost_coils: coils.min(MIDDLE_COILS),
+        cost_points: places.len(),
         tolerance: scene.tolerances.map.max(KERNEL_ERROR),
-        terms: terms(&scene, vector, (cached, tolerance), &places, progress)?,
+        terms: terms(
+            &scene,
+            &middle,
+            vector,
+            (cached, tolerance),
+            &places,
+            progress,
+        )?,
         shapes: planned,
     })
 }
 
-/// The lowest and the highest point of a shape, and the one in its middle.
-fn telling(points: &ConstraintPoints) -> Vec<[f64; 3]> {
-    let by_height = |a: &usize, b: &usize| points.height_m[*a].total_cmp(&points.height_m[*b]);
-    let all = || 0..points.len();
-    [
-        all().min_by(by_height),
-        all().max_by(by_height),
-        Some(points.len() / 2),
-    ]
-    .into_iter()
-    .flatten()
-    .filter_map(|i| {
-        Some([
-            *points.x_m.get(i)?,
-            *points.y_m.get(i)?,
-            *points.height_m.get(i)?,
-        ])
-    })
-    .collect()
+/// Points of a shape at which costs are computed: all where they are no more than `most`, else so many, spread
+/// over all, and those where costs are largest: the lowest and the highest, and the nearest to the axis of each
+/// of the `middle` coils.
+fn cost_places(points: &ConstraintPoints, middle: &Design, most: usize) -> Vec<[f64; 3]> {
+    let mut chosen = spread(points.len(), most);
+    if chosen.len() < points.len() {
+        let least =
+            |of: &dyn Fn(usize) -> f64| (0..points.len()).min_by(|a, b| of(*a).total_cmp(&of(*b)));
+        chosen.extend(least(&|i| points.height_m[i]));
+        chosen.extend(least(&|i| -points.height_m[i]));
+        for axis in &middle.array.positions_m {
+            let distance = |i: usize| (points.x_m[i] - axis[0]).hypot(points.y_m[i] - axis[1]);
+            chosen.extend(least(&distance));
+        }
+        chosen.sort_unstable();
+        chosen.dedup();
+    }
+    let place = |i: usize| [points.x_m[i], points.y_m[i], points.height_m[i]];
+    chosen.into_iter().map(place).collect()
 }
 
 fn terms(
     scene: &Scene,
+    middle: &Design,
     vector: bool,
     (cached, tolerance): (bool, Option<f64>),
     places: &[[f64; 3]],
     progress: &dyn Progress,
 ) -> Result<Vec<Term>, RunError> {
-    let design = scene.design;
     progress.begin("costs", 3);
-    let middle = middle_coils(design);
-    let places = &near(&middle, places);
+    let places = &near(middle, places);
     let driven = needed_coils(scene).len();
     let coils = scene.coils.len();
     let mut terms = vec![
@@ -216,7 +231,7 @@ fn terms(
                 cost: Some(Cost::OfTheForce(0.0)),
             }
         },
-        finite_magnet(&middle, tolerance, places),
+        finite_magnet(middle, tolerance, places),
     ];
     progress.advance(1);
     let Some(core) = &scene.core else {
@@ -230,9 +245,9 @@ fn terms(
         return Ok(terms);
     };
     terms.extend(steel_terms(&core.material, cached));
-    terms.extend(coupling(&middle, tolerance, places));
+    terms.extend(coupling(middle, tolerance, places));
     progress.advance(1);
-    terms.push(passive_force(&Scene::new(&middle)?, places)?);
+    terms.push(passive_force(&Scene::new(middle)?, places)?);
     progress.end();
     Ok(terms)
 }
