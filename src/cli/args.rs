@@ -160,7 +160,8 @@ pub struct SurfaceFlags {
     #[arg(long, hide_short_help = true, conflicts_with = "fit")]
     pub center: bool,
     /// Put the lowest point of the surface at this height above the windings, like 20mm
-    #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::height, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::height, allow_hyphen_values = true,
+          conflicts_with = "fit")]
     pub rest_on: Option<f64>,
     /// Move the surface into a box: to its middle in x and y, onto its lower end in z; a design
     /// (TOML) for its workspace, or X0,X1,Y0,Y1,Z0,Z1
@@ -176,7 +177,7 @@ pub struct SurfaceFlags {
         long,
         hide_short_help = true,
         requires = "fit",
-        conflicts_with = "center"
+        conflicts_with_all = ["center", "rest_on"]
     )]
     pub scale_to_fit: bool,
     /// STEP: farthest that a facet may lie from its face, like 0.01mm [default: a 4000th of the

@@ -16,6 +16,17 @@ const MISTAKES: &[Mistake] = &[
         &["--scale-to-fit", "cannot be used with", "--center"],
     ),
     (
+        &["discretize", BALL, "--rest-on", "20mm", "--scale-to-fit"],
+        2,
+        &["--scale-to-fit", "cannot be used with", "--rest-on"],
+    ),
+    // Both set the height, and --rest-on won without a word.
+    (
+        &["discretize", BALL, "--fit", SEED, "--rest-on", "20mm"],
+        2,
+        &["--rest-on", "cannot be used with", "--fit"],
+    ),
+    (
         &["discretize", BALL, "--out", "a.csv", "--over", SEED],
         2,
         &["--over", "cannot be used with", "--out"],

@@ -191,6 +191,18 @@ fn metres_in_a_shape_are_a_warning() {
     );
 }
 
+/// Both set the height; `rest_on_mm` won without a word.
+#[test]
+fn a_box_and_a_height_to_rest_on_are_refused_together() {
+    let box_mm = "fit_mm = [-50, 50, -50, 50, 20, 70]";
+    read(&format!("{SURFACE}{box_mm}\n"));
+    let said = refused(&format!("{SURFACE}{box_mm}\nrest_on_mm = 30\n"));
+    assert!(
+        said.len() == 1 && said[0].contains("rest_on_mm"),
+        "{said:?}"
+    );
+}
+
 #[test]
 fn several_faults_are_reported_at_once() {
     let said = refused(

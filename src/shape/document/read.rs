@@ -143,6 +143,10 @@ fn seat(root: &mut Section<'_>) -> Seat {
         let message = "fit_mm puts the surface into the middle of its box";
         root.fault("center", message, "leave one of the two out");
     }
+    if root.has("rest_on_mm") && root.has("fit_mm") {
+        let message = "fit_mm puts the surface onto the lower end of its box";
+        root.fault("rest_on_mm", message, "leave one of the two out");
+    }
     let fit = ends.map(|ends| {
         let [a, b, c, d, e, f] = ends.map(m_from_mm);
         Fit {
