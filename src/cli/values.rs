@@ -316,14 +316,19 @@ pub fn jnd_or_by_force(text: &str) -> Result<Jnd, String> {
     jnd(text).map(Jnd::Part).map_err(or)
 }
 
+/// The largest force constant, N/m: a kilonewton at a millimetre of height, which no finger bears. Squares of
+/// forces beyond double precision are far above it.
+const LARGEST_CONSTANT_N_PER_M: f64 = 1e6;
+
 /// A force constant, N/m.
 pub fn force_constant(text: &str) -> Result<f64, String> {
     let value = number(text)?;
-    if value >= 0.0 {
+    if (0.0..=LARGEST_CONSTANT_N_PER_M).contains(&value) {
         Ok(value)
     } else {
         Err(format!(
-            "invalid force constant {value}: expected N/m, 0 or more, like 2.0"
+            "invalid force constant {value:?}: expected 0 to {LARGEST_CONSTANT_N_PER_M} N/m (1 kN at a height of \
+             1 mm), like 2.0"
         ))
     }
 }

@@ -141,6 +141,8 @@ fn arguments_are_validated_with_their_meaning() {
     lambda(&["--tolerance", "-1e-9"]).says(&["invalid tolerance -1e-9"]);
     lambda(&["--jnd", "0"]).says(&["greater than 0"]);
     lambda(&["--at", "-2"]).says(&["invalid force constant -2"]);
+    // Its squares are no doubles: the result could not be written.
+    lambda(&["--at", "1e308"]).says(&["invalid force constant 1e308", "0 to 1000000 N/m"]);
     lambda(&["--threads", "0"]).says(&["from 1 to 1024"]);
     lambda(&["--criterion", "best"]).says(&["linear, jnd, saturation, maxmin"]);
     let raw = |more: &[&str]| {
