@@ -26,6 +26,19 @@ const MISTAKES: &[Mistake] = &[
         2,
         &["--rest-on", "cannot be used with", "--fit"],
     ),
+    // Of a vertical force it changed nothing.
+    (
+        &[
+            "lambda",
+            SEED,
+            BALL,
+            "--feedback",
+            "--direction-jnd",
+            "5deg",
+        ],
+        3,
+        &["--direction-jnd", "--force-direction vertical-only"],
+    ),
     (
         &["discretize", BALL, "--out", "a.csv", "--over", SEED],
         2,

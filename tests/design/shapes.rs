@@ -203,6 +203,24 @@ fn a_box_and_a_height_to_rest_on_are_refused_together() {
     );
 }
 
+/// The angle changed nothing of a vertical force, without a word.
+#[test]
+fn an_angle_that_is_noticed_needs_a_force_whose_sides_are_requested() {
+    let shape = |force: &str| format!("{SURFACE}force = \"{force}\"\ndirection_jnd_deg = 7.3\n");
+    for force in ["vertical-only", "normal"] {
+        let (document, _) = read(&shape(force));
+        assert_eq!(document.direction_jnd_deg, 7.3);
+    }
+    for text in [
+        shape("vertical"),
+        format!("{SURFACE}direction_jnd_deg = 7.3\n"),
+    ] {
+        let said = refused(&text);
+        let named = said[0].contains("direction_jnd_deg");
+        assert!(said.len() == 1 && named, "{said:?}");
+    }
+}
+
 #[test]
 fn several_faults_are_reported_at_once() {
     let said = refused(

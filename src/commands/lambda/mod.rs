@@ -159,19 +159,27 @@ impl LambdaOptions {
     }
 
     /// # Errors
-    /// A size along the normal where no object's force points along it.
+    /// A size along the normal where no object's force points along it; an angle that is noticed where sideways
+    /// forces are left open.
     pub(crate) fn check_force<'a>(
         &self,
-        mut documents: impl Iterator<Item = &'a ShapeDocument>,
+        documents: impl Iterator<Item = &'a ShapeDocument>,
     ) -> Result<(), RunError> {
-        let along = |document: &ShapeDocument| self.force.over(document.force).along_normal();
-        if self.force.normal_force.is_none() || documents.any(|d| along(d).is_some()) {
-            return Ok(());
-        }
-        Err(RunError::Input(
+        let forces = documents.map(|document| self.force.over(document.force));
+        let forces: Vec<RequestedForce> = forces.collect();
+        let mistake = if self.force.normal_force.is_some()
+            && !forces.iter().any(|force| force.along_normal().is_some())
+        {
             "--normal-force: no object's force points along its normal; add --force-direction normal"
-                .to_owned(),
-        ))
+        } else if self.direction_jnd_deg.is_some()
+            && !forces.iter().any(|force| force.direction.is_vector())
+        {
+            "--direction-jnd: a vertical force leaves sideways errors open; add --force-direction vertical-only or \
+             normal"
+        } else {
+            return Ok(());
+        };
+        Err(RunError::Input(mistake.to_owned()))
     }
 
     /// These options, the force being the document's where they request none.

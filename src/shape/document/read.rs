@@ -89,6 +89,11 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     let force = force(root);
     let noticed = Rule::any("degrees").bound(Bound::Within(1.0, 89.0));
     let direction_jnd = root.number_or("direction_jnd_deg", &noticed, DIRECTION_JND_DEG);
+    if root.has("direction_jnd_deg") && !force.direction.is_vector() {
+        let message = "it weighs sideways errors, which a vertical force leaves open";
+        let help = "add force = \"vertical-only\" or \"normal\"";
+        root.fault("direction_jnd_deg", message, help);
+    }
     let Points {
         grid,
         is_given,
