@@ -379,6 +379,22 @@ fn bad_input_is_refused_before_anything_is_measured() {
     assert!(!place.path("b").exists());
 }
 
+/// The steel was solved for all nodes, in minutes, before one of them was refused.
+#[test]
+fn map_nodes_too_close_to_steel_are_refused_before_it_is_solved() {
+    let near = REST.replace("[9.0, 31.0, 23]", "[2.1, 31.0, 23]");
+    let high = CORE.replace("above_mm = -1.0", "above_mm = 2.0");
+    let place = place(ARRAY);
+    place.write(
+        "small.toml",
+        &format!("name = \"small\"\n{ARRAY}{high}{COIL}{near}"),
+    );
+    bench(&place, &ASKED)
+        .ends(3)
+        .says(&["dome", "its map with", "from the surface of the core"]);
+    assert!(!place.path("b").exists());
+}
+
 #[test]
 #[cfg(unix)]
 fn a_signal_ends_a_run_without_a_file() {

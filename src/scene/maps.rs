@@ -135,9 +135,7 @@ impl MapTask<'_> {
             grid,
             magnet,
         } = *self;
-        if solved.has_steel() {
-            clearance_m(scene, &lowest_plane(grid), magnet.reach_m)?;
-        }
+        check_nodes(scene, grid, magnet)?;
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             tabulate(source, coils, grid, components, tolerance, p)
         };
@@ -182,11 +180,7 @@ impl MapTask<'_> {
             grid,
             magnet,
         } = *self;
-        let nearest = match &scene.iron {
-            // It may be beside or above any node.
-            Some(_) => every_node(grid),
-            None => lowest_plane(grid),
-        };
+        let nearest = nearest_to_steel(scene, grid);
         let steel = solved.sources(scene, &nearest, magnet.reach_m, magnet.amplification)?;
         let steel = steel.as_deref().and_then(SteelField::coupled);
         let steel = steel.ok_or_else(no_steel)?;
@@ -544,6 +538,23 @@ pub(crate) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
         .iter()
         .flat_map(|y| grid.x_m.iter().map(move |x| [*x, *y, z_m]))
         .collect()
+}
+
+/// Refuses nodes of `grid` where a dipole of `magnet` would be too close to steel, before any is solved.
+///
+/// # Errors
+/// The first such node.
+pub(crate) fn check_nodes(scene: &Scene, grid: &Grid, magnet: &MagnetMean) -> Result<(), RunError> {
+    clearance_m(scene, &nearest_to_steel(scene, grid), magnet.reach_m).map(|_| ())
+}
+
+/// The nodes that may be the nearest to steel.
+fn nearest_to_steel(scene: &Scene, grid: &Grid) -> Vec<[f64; 3]> {
+    match &scene.iron {
+        // It may be beside or above any node.
+        Some(_) => every_node(grid),
+        None => lowest_plane(grid),
+    }
 }
 
 fn every_node(grid: &Grid) -> Vec<[f64; 3]> {

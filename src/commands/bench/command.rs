@@ -18,9 +18,9 @@ use crate::cli::start::{begin, folder};
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::command::CriterionFlags;
 use crate::design::Need;
-use crate::scene::Scene;
 use crate::scene::cost::{Components, of_map};
 use crate::scene::named_files::NamedContent;
+use crate::scene::{Scene, coupled};
 
 /// Error against run time of a design and its objects
 ///
@@ -30,8 +30,8 @@ use crate::scene::named_files::NamedContent;
 /// of the felt force (what the currents give by the interpolated map against what they give in the
 /// refined field: the largest all over the surface, its rim too, as estimated) and the processor time;
 /// names the cheapest settings within 10, 1 and 0.1 %, to paste. Writes bench.json, bench.csv, two
-/// pictures per object and report.html. How long it takes is said before it begins: with --quick within a minute
-/// of processor time, else within ten, where settings can be spared for it.
+/// pictures per object and report.html. How long it takes is said once the present settings have run: with --quick
+/// within a minute of processor time, else within ten, where settings can be spared for it.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
     ("fluxform bench designs/seed_air.toml shapes/flat.toml --quick",
@@ -108,6 +108,12 @@ impl Bench {
             out,
             force: self.writing.force,
         };
+        if coupled(design) || design.has_iron() {
+            printer.notice(
+                "the present settings run first, with the steel solved for them; how long all settings take is \
+                 said then",
+            );
+        }
         let bar = begin(printer);
         let file = run(&request, &|estimate| printer.notice(&said(estimate)), &bar)?;
         drop(bar);

@@ -136,7 +136,7 @@ impl Ladders {
         shape: &ShapeSource,
         present: Present,
     ) -> Self {
-        let most = if request.quick { QUICK } else { FACTORS.len() };
+        let most = most_factors(request);
         let asked = request.lambda.tolerance;
         let tolerance = tolerances(present_tolerance, asked);
         let heights = present.grid.height_m.iter();
@@ -148,7 +148,7 @@ impl Ladders {
         Self {
             tolerance,
             points,
-            nodes: nodes(request.design, &FACTORS[..most.min(OF_MAPS)]),
+            nodes: map_nodes(request),
             points_present: present.grid,
             seconds: present.seconds,
         }
@@ -380,7 +380,14 @@ fn graded(deviation_m: f64, lowest_m: f64, quick: bool) -> Vec<PointsRung> {
     deviations.iter().map(rung).collect()
 }
 
-fn nodes(design: &Design, factors: &[f64]) -> Vec<NodesRung> {
+fn most_factors(request: &BenchRequest) -> usize {
+    if request.quick { QUICK } else { FACTORS.len() }
+}
+
+/// The nodes of all maps, from few to many, before any is left out.
+pub fn map_nodes(request: &BenchRequest) -> Vec<NodesRung> {
+    let design = request.design;
+    let factors = &FACTORS[..most_factors(request).min(OF_MAPS)];
     let present = present_samples(design);
     let count = |samples: [usize; 3]| samples.iter().map(|n| *n as f64).product::<f64>();
     let mut rungs: Vec<NodesRung> = Vec::new();

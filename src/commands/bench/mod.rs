@@ -118,8 +118,13 @@ fn measure(
     let bench = Bench::new(&scene, request, effort, progress);
     let mut planned = Vec::new();
     progress.begin("present settings", 4 * request.shapes.len() as u64);
-    for shape in request.shapes {
-        let present = bench.present(shape)?;
+    let points = request
+        .shapes
+        .iter()
+        .map(|shape| bench.present_points(shape));
+    let points: Vec<_> = points.collect::<Result<_, _>>()?;
+    for (shape, points) in request.shapes.iter().zip(points) {
+        let present = bench.present(points)?;
         planned.push(Ladders::new(request, scene.tolerances.map, shape, present));
     }
     progress.end();

@@ -2,7 +2,7 @@
 
 use super::BenchRequest;
 use super::clock::{Effort, measure};
-use super::ladder::{Ladders, Points, Present, Seconds, present_samples};
+use super::ladder::{Ladders, Points, Present, Seconds, map_nodes, present_samples};
 use crate::RunError;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::commands::calibrate::DEFAULT_REACH_M;
@@ -14,7 +14,7 @@ use crate::commands::lambda::{ForcePoints, LambdaOptions, resolving, solve_at};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::maps::{MagnetMean, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap, check_nodes};
 use crate::scene::sources::Sampling;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
@@ -207,15 +207,24 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// The present points of one object, and how long they take, s.
+    ///
+    /// # Errors
+    /// Points outside the workspace; those whose maps have nodes too close to steel.
+    pub fn present_points(&self, shape: &ShapeSource) -> Result<(PointsReport, f64), RunError> {
+        let timed = self.timed(|within| discretize::run(&shape.document, Vec::new(), within))?;
+        let points = &timed.0.discretized.points;
+        self.inside(&shape.document.name, points)?;
+        self.off_steel(&shape.document.name, points)?;
+        Ok(timed)
+    }
+
     /// One object at the present settings.
     ///
     /// # Errors
-    /// Points outside the workspace, and those of the stages.
-    pub fn present(&self, shape: &ShapeSource) -> Result<Present, RunError> {
-        let (report, points_s): (PointsReport, f64) =
-            self.timed(|within| discretize::run(&shape.document, Vec::new(), within))?;
+    /// Those of the stages.
+    pub fn present(&self, (report, points_s): (PointsReport, f64)) -> Result<Present, RunError> {
         let grid = report.discretized.points.clone();
-        self.inside(&shape.document.name, &grid)?;
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
         let (_, lambda_s) = self.lambda(
             &solved,
@@ -236,6 +245,24 @@ impl<'a> Bench<'a> {
             },
             grid,
         })
+    }
+
+    /// Refuses maps with nodes at which the field of steel is not resolved.
+    fn off_steel(&self, shape: &str, points: &ConstraintPoints) -> Result<(), RunError> {
+        let share = MAGNET_SHARE * self.scene.tolerances.map;
+        for rung in map_nodes(self.request) {
+            let design = self.request.design.with_nodes(rung.samples);
+            let grid = needed_nodes(&design, points, DEFAULT_REACH_M);
+            let magnet = MagnetMean::by_magnet(self.scene, &grid.z_m, share)?;
+            check_nodes(self.scene, &grid, &magnet).map_err(|error| {
+                let [x, y, z] = rung.samples;
+                RunError::Input(format!(
+                    "shape {shape:?}: its map with {x} x {y} x {z} nodes in [workspace]: {error}; let z_mm of \
+                     [workspace] begin higher"
+                ))
+            })?;
+        }
+        Ok(())
     }
 
     /// Refuses points where a runtime has no map.
