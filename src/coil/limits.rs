@@ -654,6 +654,16 @@ pub fn of_shapes(limits: &Limits) -> impl Iterator<Item = &'static Limit> {
     named.filter(|row| (row.of)(limits).is_some())
 }
 
+/// A warning for each limit that [`of_shapes`] names, where it is not checked.
+pub fn unchecked(limits: &Limits) -> impl Iterator<Item = String> {
+    of_shapes(limits).map(|limit| {
+        format!(
+            "{}: not checked, as it follows from shapes; `optimize --for` checks it",
+            limit.design_key
+        )
+    })
+}
+
 /// Every limit that the coil's design names, by the names that artefacts use, and `winding_fill`.
 #[must_use]
 pub fn check(coil: &Evaluated<'_>) -> BTreeMap<&'static str, LimitCheck> {

@@ -105,7 +105,7 @@ fn regression_the_settling_limit_held_for_a_coil_alone() {
     assert_eq!(result["limits"]["array_settling_s"]["limit"], 0.1);
 }
 
-/// Heat by use is that of `lambda --feedback`, the cost that of the masses; `evaluate` knows no shapes and says so.
+/// Heat by use is that of `lambda --feedback`, the cost that of the masses; `evaluate` and `lambda` say that they do not check it.
 #[test]
 fn heat_by_use_and_cost_are_limits() {
     let place = Place::new();
@@ -127,6 +127,12 @@ fn heat_by_use_and_cost_are_limits() {
     let lambda = ["lambda", "best.toml", FLAT, "--feedback"];
     let lambda = place.run(&[&lambda[..], &["--format", "json"]].concat());
     let lambda = lambda.ends(0).json();
+    // It left them out without a word.
+    let warned = lambda["warnings"].to_string();
+    for key in ["static", "feedback"] {
+        let unchecked = format!("limits.{key}_power_max_w: not checked");
+        assert!(warned.contains(&unchecked), "{warned}");
+    }
     let checked = |key: &str| number(&result, &format!("limits/{key}/value"));
     for (key, stated) in [
         ("static_power_w", "feedback/without/power_w"),

@@ -18,7 +18,7 @@ use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_w
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
-use crate::coil::limits::of_shapes;
+use crate::coil::limits::unchecked;
 use crate::design::{Design, Need};
 use crate::report::limits::label;
 use crate::scene::cost::of_steel;
@@ -88,11 +88,8 @@ impl Evaluate {
         for warning in &result.warnings {
             printer.warning(warning);
         }
-        for limit in of_shapes(&design.limits) {
-            printer.warning(&format!(
-                "{}: not checked, as it follows from shapes; `optimize --for` checks it",
-                limit.design_key
-            ));
+        for warning in unchecked(&design.limits) {
+            printer.warning(&warning);
         }
         let json = printer.with_warnings(&result);
         let mut place = Stream::Output;

@@ -21,6 +21,7 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
+use crate::coil::limits::unchecked;
 use crate::design::{Design, Need};
 use crate::lambda::{Criterion, Jnd, Settings, Wiring};
 use crate::scene::cost::{Cost, of_uncertainties, of_variants};
@@ -224,6 +225,9 @@ impl Lambda {
             cost_origin(&shapes),
             printer,
         )?;
+        for warning in unchecked(&design.limits) {
+            printer.warning(&warning);
+        }
         let bar = begin(printer);
         for shape in shapes {
             let inputs = std::iter::once(document.input.clone())
