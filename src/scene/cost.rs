@@ -413,6 +413,7 @@ fn product(factors: &[usize]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::Need;
 
     /// The largest size of a row of the scaling that is recorded, and its seconds.
     fn largest(stage: &str, axis: &str) -> (f64, f64) {
@@ -456,5 +457,24 @@ mod tests {
             let share = (law.seconds)(count, coils) / seconds;
             assert!((0.33..3.0).contains(&share), "{stage}: {share}");
         }
+    }
+
+    /// `time fluxform lambda` of this design: two minutes of processor time.
+    #[test]
+    fn the_pull_of_a_plate_is_long() {
+        let text = "name = \"plate\"\n[coil]\ninner_diameter_mm = 20\nouter_diameter_mm = 38\nlength_mm = 60\n\
+                    [wire]\ndiameter_mm = 0.7\n[core]\nabove_mm = 3\nbelow_mm = 5\nrelative_permeability = 500\n\
+                    [array]\nrows = 2\ncolumns = 2\npitch_mm = 45\n[magnet]\ndiameter_mm = 10\nlength_mm = 10\n\
+                    magnetization_a_per_m = 1.1579e6\nmodel = \"cylinder\"\npassive_force = true\n\
+                    [supply]\ncurrent_max_a = 2\n[workspace]\nx_mm = [-40, 40, 33]\ny_mm = [-40, 40, 33]\nz_mm = [16, 64, 17]\n\
+                    [[iron]]\nshape = \"box\"\nsize_mm = [120, 120, 5]\ncenter_mm = [0, 0, -70]\n\
+                    [[iron]]\nshape = \"cylinder\"\ndiameter_mm = 12\nlength_mm = 40\ncenter_mm = [55, 0, -20]\n";
+        let cost = |text: &str| {
+            let (design, _) = Design::from_toml(text, "d.toml".as_ref(), Need::CALIBRATE).unwrap();
+            of_pull(&design, 1e-3).map(|cost| cost.cpu_seconds)
+        };
+        let cpu_s = cost(text).unwrap();
+        assert!((40.0..360.0).contains(&cpu_s), "{cpu_s}");
+        assert_eq!(cost(&text.replace("passive_force = true", "")), None);
     }
 }
