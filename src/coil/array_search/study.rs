@@ -173,6 +173,12 @@ impl Effort {
             },
         }
     }
+
+    /// Descents on surrogates that the study may take.
+    #[must_use]
+    pub const fn climbs(self) -> usize {
+        self.evaluations * (1 + self.other_starts)
+    }
 }
 
 /// The quantities that are traded for the objective, by key.

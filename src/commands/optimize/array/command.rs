@@ -381,6 +381,9 @@ fn vary(text: &str) -> Result<(String, toml::Value), String> {
     Ok((axis.key, toml::Value::Array(values)))
 }
 
+/// Processor time of a descent on a surrogate for each of its variables, about (`time fluxform optimize --front`).
+const CLIMB_S: f64 = 3e-3;
+
 /// The computation that follows, stated first: every number of coils where each is searched to its end, else the
 /// costliest of them.
 fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
@@ -393,15 +396,14 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
         let steel = cost::of_steel(&array, physics.tolerance(Level::Search, &array));
         let forces = physics.count(Level::Search) * space.coils();
         let steel_s: f64 = steel.iter().map(|cost| cost.cpu_seconds).sum();
-        (
-            space.coils(),
-            steel_s + forces as f64 * cost::STEEL_POINT_COIL_S,
-        )
+        steel_s + forces as f64 * cost::STEEL_POINT_COIL_S
     };
     let mut each_cpu_s = BTreeMap::new();
-    for (coils, cpu_s) in spaces.map(cpu_s) {
-        let known: &mut f64 = each_cpu_s.entry(coils).or_default();
-        *known = known.max(cpu_s);
+    let mut variables = 0;
+    for space in spaces {
+        let known: &mut f64 = each_cpu_s.entry(space.coils()).or_default();
+        variables = variables.max(space.variables().len());
+        *known = known.max(cpu_s(space));
     }
     let costliest = each_cpu_s.values().copied().fold(0.0, f64::max);
     let (ends, ends_cpu_s) = match request.every_count {
@@ -409,15 +411,15 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
         false => (1, costliest),
     };
     let compared = compared(choices.len(), request.settings);
-    let (searched, around) = (
-        request.settings.evaluations,
-        Effort::of(request.every_count).evaluations,
-    );
+    let effort = Effort::of(request.every_count);
+    let (searched, around) = (request.settings.evaluations, effort.evaluations);
+    let climbs_s = CLIMB_S * (ends * effort.climbs() * variables) as f64;
+    let arrays_s = compared as f64 * costliest + (searched + around) as f64 * ends_cpu_s;
     format!(
         "computes up to {} arrays and about {} around the best, about {:.0} CPU s; Ctrl-C gives the best so far",
         compared + ends * searched,
         ends * around,
-        (compared as f64 * costliest + (searched + around) as f64 * ends_cpu_s).ceil()
+        (arrays_s + climbs_s).ceil()
     )
 }
 
