@@ -443,6 +443,55 @@ fn an_earlier_run_is_taken_up_and_threads_do_not_matter() {
         .ends(0)
         .out;
     assert_eq!(first, again);
+    // A run that computes more takes the journal's place, as after an interruption; it was refused at its end.
+    let kept = place.text("kept.json");
+    let other = search(&["--journal", "kept.json", "--seed", "3"]);
+    place.run(&other).ends(0);
+    let grown = place.text("kept.json");
+    assert!(grown.len() > kept.len(), "{} {}", grown.len(), kept.len());
+    place.write("kept.json", &grown.replacen('#', "# mine", 1));
+    place.run(&other).ends(4).says(&["kept.json"]);
+}
+
+/// The optimum's length was rounded beyond the limit that it lies on, and the given design taken in its place.
+#[test]
+fn an_optimum_on_a_limit_stays_within_it() {
+    let place = Place::new();
+    let design = "name = \"near\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 60\n\
+                  [wire]\ndiameter_mm = 0.7\n[magnet]\ndiameter_mm = 10\nlength_mm = 8\n\
+                  magnetization_a_per_m = 1.1e6\npolarity = \"repel\"\n[supply]\ncurrent_max_a = 2\n\
+                  total_current_max_a = 6\n[target]\nheight_mm = 28\n[workspace]\nx_mm = [-50, 50, 11]\n\
+                  y_mm = [-50, 50, 11]\nz_mm = [20, 80, 7]\n[array]\nrows = 2\npitch_mm = 45\n";
+    let flat = "name = \"f\"\nprimitive = \"flat\"\nheight_mm = 40\n[points]\nx_mm = [-40, 40, 11]\n\
+                y_mm = [-40, 40, 11]\n";
+    place.write("f.toml", flat);
+    for (name, more) in [
+        (
+            "touching",
+            "columns = 2\n[search]\narray.move_mm = [-3, 10]\n",
+        ),
+        (
+            "wide",
+            "columns = 4\n[search]\narray.pitch_mm = [40, 60]\n[limits]\nfootprint_max_mm = 184\n",
+        ),
+    ] {
+        place.write("near.toml", &format!("{design}{more}"));
+        let run = place.run(&[
+            "optimize",
+            "near.toml",
+            "--for",
+            "f.toml",
+            "--evaluations",
+            "60",
+            "--format",
+            "json",
+        ]);
+        let result = run.ends(0).json();
+        assert!(number(&result, "gain") > 1.15, "{name}: {}", result["gain"]);
+        for limit in result["limits"].as_object().unwrap().values() {
+            assert_eq!(limit["met"], true, "{name}: {limit}");
+        }
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::digest::Written;
 use super::dir::{Dir, EntryStatus, Kind, followed};
 use super::names::parent_of;
 use super::record::{Record, ReplacedNote, State, digest, is_timing, unchanged};
-use crate::artefact::{Input, Options};
+use crate::artefact::{Input, Options, sha256_hex};
 
 /// So many bytes at the beginning of a mark give the kind of file, whatever it was made from.
 const KIND_BYTES: usize = 16;
@@ -26,6 +26,8 @@ pub struct Overwrite {
     inputs: Vec<Input>,
     /// Other paths that must not be replaced: files, and folders with all that is in them.
     protected: Vec<PathBuf>,
+    /// What the run read from the file that it replaces.
+    taken_up: Option<Written>,
 }
 
 /// Evidence that an existing file is this program's own.
@@ -55,6 +57,7 @@ impl Overwrite {
             evidence,
             inputs: inputs.to_vec(),
             protected: Vec::new(),
+            taken_up: None,
         }
     }
 
@@ -95,6 +98,17 @@ impl Overwrite {
     #[must_use]
     pub(crate) fn now_beginning(mut self, mark: &str) -> Self {
         self.evidence = Evidence::SameBytes(mark.into());
+        self
+    }
+
+    /// Nor need it have the bytes which are to be written where it still has these, which the run read from it and
+    /// went on from.
+    #[must_use]
+    pub fn taking_up(mut self, bytes: &[u8]) -> Self {
+        self.taken_up = Some(Written {
+            bytes: bytes.len() as u64,
+            sha256: sha256_hex(bytes),
+        });
         self
     }
 
@@ -236,7 +250,15 @@ impl Overwrite {
                     false => Err("and was not made from these inputs".to_owned()),
                 };
             }
-            Evidence::SameBytes(_) => return Err("and differs".to_owned()),
+            Evidence::SameBytes(_) => {
+                let unread = |it: &Written| {
+                    status.bytes != it.bytes || digest(dir, name).ok().as_ref() != Some(&it.sha256)
+                };
+                return match self.taken_up.as_ref().is_none_or(unread) {
+                    true => Err("and differs".to_owned()),
+                    false => Ok(()),
+                };
+            }
             Evidence::Record { path, .. } => path,
         };
         let shown = record.display();

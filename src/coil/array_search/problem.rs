@@ -346,12 +346,32 @@ impl<'a> ArrayProblem<'a> {
             .reduce(|a, b| if rank(&b.1) > rank(&a.1) { b } else { a })
     }
 
+    /// The variables of a design as it is made: lengths rounded, to the other side where the nearer one breaks a limit
+    /// that `x` meets, as far as limits are known without physics.
+    #[must_use]
+    pub fn made(&self, x: &[f64]) -> Vec<f64> {
+        let broken = |x: &[f64]| self.bounds(x, None).iter().filter(|b| !b.is_met()).count();
+        let mut made = self.space.made(x);
+        let (least, mut now) = (broken(x), broken(&made));
+        for (index, beyond) in self.space.made_beyond(x, &made) {
+            if now <= least {
+                break;
+            }
+            let near = std::mem::replace(&mut made[index], beyond);
+            match broken(&made) {
+                fewer if fewer < now => now = fewer,
+                _ => made[index] = near,
+            }
+        }
+        made
+    }
+
     /// The computed properties of the design as it is made.
     ///
     /// # Errors
     /// Interruption.
     pub fn physical(&self, x: &[f64], level: Level) -> Result<Option<Physical>, Interrupted> {
-        let made = self.space.made(x);
+        let made = self.made(x);
         let design = self.space.design(&made);
         if !is_solid(&design) {
             return Ok(None);
@@ -526,9 +546,16 @@ impl<'a> ArrayProblem<'a> {
 
     /// By how much a search must stay below a limit, or above it.
     fn margin(&self, bound: &Bounded) -> f64 {
+        let space = &self.space;
+        let made_exactly = bound.scale.is_some() || bound.name == Some(LimitName::Pitch);
         match bound.name {
-            // A length that is not wound is not rounded, and may be at its limit as given.
-            _ if !self.space.is_wound() && !self.space.varies_plate() => MET,
+            // What is not rounded, or is rounded to the right side, may be at its limit.
+            _ if !space.is_wound()
+                && !space.varies_plate()
+                && (made_exactly || !space.rounds()) =>
+            {
+                MET
+            }
             // Whole wires meet it exactly.
             Some(LimitName::Length) => -ROUNDING,
             _ => MARGIN,

@@ -82,7 +82,7 @@ impl Candidate {
 
     /// The design at `x` to full accuracy.
     fn of(problem: &ArrayProblem, x: &[f64], physical: Physical) -> Self {
-        let x = problem.space.made(x);
+        let x = problem.made(x);
         Self {
             bounds: problem.bounds(&x, Some(&physical)),
             x,
@@ -136,7 +136,7 @@ impl SearchedChoice {
         let space = &problem.space;
         let best = problem.best(search);
         let values = best.as_ref().map_or_else(BTreeMap::new, |(sample, _)| {
-            space.named(&space.made(&sample.x))
+            space.named(&problem.made(&sample.x))
         });
         let met = best.filter(|(_, judged)| judged.excess() <= MET);
         let magnet = &space.base().magnet;
@@ -209,7 +209,7 @@ impl Found<'_> {
             return Ok(false);
         };
         self.best = Candidate {
-            x: self.problem.space.made(&best.x),
+            x: self.problem.made(&best.x),
             ..best
         };
         self.choices[0] = SearchedChoice::of(self.problem, &self.search);
@@ -484,7 +484,7 @@ pub fn run<'a>(
     let (best, choices) = to_its_end(|| {
         let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));
         let best = best.map(|best| Candidate {
-            x: problem.space.made(&best.x),
+            x: problem.made(&best.x),
             ..best
         });
         let all = std::iter::once((index, &search)).chain(
@@ -576,7 +576,7 @@ fn searched(problem: &ArrayProblem, search: &Search) -> Option<Candidate> {
     let (sample, _) = problem.best(search)?;
     let physical = problem.properties(sample)?;
     Some(Candidate {
-        bounds: problem.bounds(&problem.space.made(&sample.x), Some(&physical)),
+        bounds: problem.bounds(&problem.made(&sample.x), Some(&physical)),
         x: sample.x.clone(),
         physical,
         level: Level::Search,

@@ -159,6 +159,14 @@ fn mm(length_m: f64) -> f64 {
     twelve_digits(length_m * 1e3)
 }
 
+fn made_step_mm(axis: &Axis) -> f64 {
+    match axis {
+        // A plate's mass is to stay within its limit.
+        Axis::Plate(_) => 0.01 * MADE_MM,
+        _ => MADE_MM,
+    }
+}
+
 /// To nanometres, as it is written.
 fn to_nanometres(length_mm: f64) -> f64 {
     (length_mm * 1e6).round() / 1e6 + 0.0
@@ -552,17 +560,30 @@ impl Space {
     pub fn made(&self, x: &[f64]) -> Vec<f64> {
         let rounded = |((x, variable), axis): ((&f64, &Variable), &Axis)| match variable.values {
             Values::Continuous => {
-                let step = match axis {
-                    // A plate's mass is to stay within its limit.
-                    Axis::Plate(_) => 0.01 * MADE_MM,
-                    _ => MADE_MM,
-                };
+                let step = made_step_mm(axis);
                 to_nanometres((x / step).round() * step).clamp(variable.low, variable.high)
             }
             Values::Whole | Values::Listed(_) => *x,
         };
         let variables = x.iter().zip(&self.variables);
         variables.zip(&self.axes).map(rounded).collect()
+    }
+
+    /// What [`Self::made`] would have of each variable that it rounded, on the other side of `x`.
+    pub(super) fn made_beyond(&self, x: &[f64], made: &[f64]) -> Vec<(usize, f64)> {
+        let beyond = |index: usize| {
+            let Variable { low, high, .. } = self.variables[index];
+            let step = made_step_mm(&self.axes[index]).copysign(x[index] - made[index]);
+            (index, to_nanometres(made[index] + step).clamp(low, high))
+        };
+        let rounded = (0..x.len()).filter(|index| x[*index] != made[*index]);
+        rounded.map(beyond).collect()
+    }
+
+    /// Whether any length is rounded where it is made.
+    pub(super) fn rounds(&self) -> bool {
+        let mut variables = self.variables.iter();
+        variables.any(|variable| matches!(variable.values, Values::Continuous))
     }
 
     /// Bore, outer diameter, length and turns of the winding, mm; layers and turns may be fractions.

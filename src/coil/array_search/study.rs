@@ -321,7 +321,7 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
             costs: [mass, power, settling],
             met: bounds.iter().all(Bounded::is_met),
             met_but,
-            values: problem.space.named(&problem.space.made(&sample.x)),
+            values: problem.space.named(&problem.made(&sample.x)),
             source,
             x: sample.x.clone(),
             full: problem.is_known_fully(&sample.x),
@@ -350,7 +350,7 @@ impl<'s, 'a> View<'s, 'a> {
 
     fn named(&self, x: &[f64]) -> BTreeMap<String, f64> {
         let space = &self.problem.space;
-        space.named(&space.made(x))
+        space.named(&self.problem.made(x))
     }
 
     /// The problem's own judgement of what the surrogate has.

@@ -133,7 +133,8 @@ impl ArrayFlags {
         let outputs = self.outputs(shared, &document, &inputs)?;
         let bar = begin(printer);
         let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
-        self.read_journal(&physics)?;
+        let earlier = self.read_journal(&physics)?;
+        let of_journal = outputs.marked.clone().taking_up(earlier.as_bytes());
         let request = self.request(shared, shapes.len())?;
         printer.notice(&estimate(&design, &physics, &request));
         let source = Document {
@@ -148,7 +149,7 @@ impl ArrayFlags {
         drop(bar);
         // Writing polls, and would give up after a stop what the search still answered.
         let status = to_its_end(|| -> Result<_, Failure> {
-            self.write_journal(&journal, &outputs.mark, &outputs.marked, printer)?;
+            self.write_journal(&journal, &outputs.mark, &of_journal, printer)?;
             let result = ended?;
             for warning in &result.warnings {
                 printer.warning(warning);
@@ -322,12 +323,13 @@ impl ArrayFlags {
         })
     }
 
-    fn read_journal(&self, physics: &ArrayPhysics) -> Result<(), Failure> {
+    /// The text of an earlier run's journal, whose arrays the physics know from now on; empty without one.
+    fn read_journal(&self, physics: &ArrayPhysics) -> Result<String, Failure> {
         let Some(FileArgument::Path(path)) = &self.journal else {
-            return Ok(());
+            return Ok(String::new());
         };
         if !path.exists() {
-            return Ok(());
+            return Ok(String::new());
         }
         let text = crate::design::source::text_of(path)
             .map_err(|fault| Failure::Documents(vec![fault]))?;
@@ -339,7 +341,7 @@ impl ArrayFlags {
             ))
         })?;
         physics.remember(journal);
-        Ok(())
+        Ok(text)
     }
 
     fn write_journal(
