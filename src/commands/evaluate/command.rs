@@ -23,7 +23,7 @@ use crate::design::{Design, Need};
 use crate::report::limits::label;
 use crate::scene::cost::of_steel;
 use crate::scene::field_slice;
-use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
+use crate::scene::neighbours::{ArraySummary, IronSummary, WorkingPointSummary};
 use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 
 /// Evaluate one coil as given: circuit, field and force at the target, limits
@@ -167,33 +167,41 @@ fn summary(design: &Design, result: &Evaluation) -> String {
     }
     sheet.line("target", &at_target(target));
     if let Some(array) = &result.array {
-        let matrix = &array.mutual_inductance_h;
-        let others = matrix.iter().enumerate().flat_map(|(i, row)| {
-            let other = move |(j, value): (usize, &f64)| (i != j).then_some(value.abs());
-            row.iter().enumerate().filter_map(other)
-        });
-        let largest = others.fold(0.0, f64::max);
-        sheet.line(
-            "array",
-            &format!(
-                "{}; largest mutual inductance {} ({} of a coil's own)\n\
-                 the slowest pattern of currents settles after {}",
-                describe::array(design),
-                si(largest, "H"),
-                percent(largest / circuit.inductance_h),
-                si(array.settling_s, "s")
-            ),
-        );
-        if let Some(point) = &array.working_point {
-            sheet.line("", &all_at_once(array, point));
-        }
-        cores(&mut sheet, design, array);
+        add_array(&mut sheet, design, array, circuit.inductance_h);
     }
     let stages = result.accuracy.iter().map(|(name, stage)| (*name, stage));
     sheet.line("accuracy", &describe::accuracy(stages));
     sheet.gap();
     sheet.raw(&limits(result));
     sheet.finish()
+}
+
+/// The coils beside each other; `inductance_h` is that of one alone.
+fn add_array(sheet: &mut Sheet, design: &Design, array: &ArraySummary, inductance_h: f64) {
+    let matrix = &array.mutual_inductance_h;
+    let others = matrix.iter().enumerate().flat_map(|(i, row)| {
+        let other = move |(j, value): (usize, &f64)| (i != j).then_some(value.abs());
+        row.iter().enumerate().filter_map(other)
+    });
+    let largest = others.fold(0.0, f64::max);
+    sheet.line(
+        "array",
+        &format!(
+            "{}; largest mutual inductance {} ({} of a coil's own)\n\
+             the slowest pattern of currents settles after {}",
+            describe::array(design),
+            si(largest, "H"),
+            percent(largest / inductance_h),
+            si(array.settling_s, "s")
+        ),
+    );
+    if let Some(point) = &array.working_point {
+        sheet.line("", &all_at_once(array, point));
+    }
+    cores(sheet, design, array);
+    if let Some(iron) = &array.iron {
+        sheet.line("bodies", &bodies(iron));
+    }
 }
 
 /// The steel of the coil alone.
@@ -248,13 +256,16 @@ fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
     )
 }
 
-/// Force and field at the target.
-fn at_target(target: &TargetSummary) -> String {
-    let way = |f: f64| match f {
+fn way(force_n: f64) -> &'static str {
+    match force_n {
         f if f > 0.0 => " up",
         f if f < 0.0 => " down",
         _ => "",
-    };
+    }
+}
+
+/// Force and field at the target.
+fn at_target(target: &TargetSummary) -> String {
     let mut text = format!(
         "{}{} on the magnet, {} above the coil at {}",
         force(target.force_n.abs()),
@@ -325,6 +336,25 @@ fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
             sheet.line(label, format!("{head}\n{rest}").trim_end());
         }
     }
+}
+
+/// The plate and other bodies of steel.
+fn bodies(iron: &IronSummary) -> String {
+    let tenths = |m: f64| number((1e4 * m).round() / 10.0 + 0.0);
+    let mut text = format!(
+        "|B| up to {} T with all coils at their rated currents, at x, y, z = {} mm\nthe knee is at {} T",
+        number_to(iron.peak_field_t, 4),
+        iron.peak_at_m.map(tenths).join(", "),
+        number_to(iron.knee_t, 4)
+    );
+    if let Some(pull) = iron.passive_force_n {
+        text.push_str(&format!(
+            "\n{}{} by all unpowered steel, at the target's height over the middle coil",
+            force(pull.abs()),
+            way(pull)
+        ));
+    }
+    text
 }
 
 fn limits(result: &Evaluation) -> String {
