@@ -25,13 +25,13 @@ const STEEL: f64 = 0.1;
 /// The tightest tolerance requested of steel.
 const TIGHTEST_STEEL: f64 = 1e-9;
 /// Where the stated error of the refined steel is at most this share of the present one's, the change between them
-/// tells what is left. That of evaluating it follows the tolerance, and tells nothing.
+/// shows what is left. That of evaluating it follows the tolerance, and shows nothing.
 const CLEARLY_LESS: f64 = 1.0 / 3.0;
 /// What is left of that change at most: of errors that fall to a third, a half. The stated ones often fall by more
 /// than the true ones, so their ratio itself is not relied on.
 const LEFT_OF_CHANGE: f64 = 0.5;
 
-/// The refined field beside the present one, which tells what it may still be off by.
+/// The refined field beside the present one, which shows what it may still be off by.
 struct Fields {
     refined: Solved,
     /// The present field; `None` where the stated error of the refined one is not clearly less.
@@ -71,10 +71,10 @@ impl Fields {
         if alone && finer >= TIGHTEST_STEEL && !clearly(&refined) {
             refined = solve(finer)?;
         }
-        let tells = refined.has_steel() && clearly(&refined);
+        let clearer = refined.has_steel() && clearly(&refined);
         Ok(Self {
             refined,
-            present: tells.then_some(present),
+            present: clearer.then_some(present),
         })
     }
 
