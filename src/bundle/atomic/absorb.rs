@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::dir::{Dir, EntryStatus, Kind, followed};
 use super::names::MANIFEST;
-use super::record::{Record, digest, is_timing, unchanged};
+use super::record::{Record, digest, has, is_timing};
 use super::{Overwrite, WriteError};
 use crate::artefact::FileEntry;
 
@@ -53,7 +53,7 @@ impl Owned {
         }
         match listed.get(path) {
             _ if path == MANIFEST => Ok(status.is_some_and(|it| it.kind == Kind::File)),
-            Some(entry) => unchanged(dir, name, entry),
+            Some(entry) => has(dir, name, entry.bytes, &entry.sha256),
             None => Ok(path == TIMING && is_timing(dir, name)),
         }
     }
@@ -134,9 +134,7 @@ impl Owned {
         if forced && status.kind == Kind::File && !self.reads(Some(status)) {
             return Ok(State::Free);
         }
-        let same = status.kind == Kind::File
-            && status.bytes == entry.bytes
-            && digest(&dir, name)? == entry.sha256;
+        let same = has(&dir, name, entry.bytes, &entry.sha256)?;
         Ok(if same || self.owns(&entry.path, &dir, name)? {
             State::Free
         } else if self.reads(Some(status)) {

@@ -8,7 +8,7 @@ use super::WriteError;
 use super::digest::Written;
 use super::dir::{Dir, EntryStatus, Kind, followed};
 use super::names::parent_of;
-use super::record::{Record, ReplacedNote, State, digest, is_timing, unchanged};
+use super::record::{Record, ReplacedNote, State, has, is_timing};
 use crate::artefact::{Input, Options, sha256_hex};
 
 /// So many bytes at the beginning of a mark give the kind of file, whatever it was made from.
@@ -208,8 +208,7 @@ impl Overwrite {
         let real = real(target).map_err(fail)?;
         let (dir, name) = Dir::of(&real).map_err(fail)?;
         if let Some(written) = written
-            && status.bytes == written.bytes
-            && digest(&dir, &name).map_err(fail)? == written.sha256
+            && has(&dir, &name, written.bytes, &written.sha256).map_err(fail)?
         {
             return Ok(Permit::Same);
         }
@@ -251,12 +250,10 @@ impl Overwrite {
                 };
             }
             Evidence::SameBytes(_) => {
-                let unread = |it: &Written| {
-                    status.bytes != it.bytes || digest(dir, name).ok().as_ref() != Some(&it.sha256)
-                };
-                return match self.taken_up.as_ref().is_none_or(unread) {
-                    true => Err("and differs".to_owned()),
-                    false => Ok(()),
+                let still = |it: &Written| has(dir, name, it.bytes, &it.sha256).unwrap_or(false);
+                return match self.taken_up.as_ref().is_some_and(still) {
+                    true => Ok(()),
+                    false => Err("and differs".to_owned()),
                 };
             }
             Evidence::Record { path, .. } => path,
@@ -275,7 +272,7 @@ impl Overwrite {
         for entry in found.files().into_iter().chain(replaced) {
             if is(&parent_of(record).join(&entry.path)) {
                 lists = true;
-                if unchanged(dir, name, &entry).unwrap_or(false) {
+                if has(dir, name, entry.bytes, &entry.sha256).unwrap_or(false) {
                     return Ok(());
                 }
             }

@@ -109,13 +109,13 @@ impl Record {
     }
 }
 
-/// Whether the regular file `name` in `dir` has the size and digest that `entry` states.
-pub(super) fn unchanged(dir: &Dir, name: &OsStr, entry: &FileEntry) -> io::Result<bool> {
-    match dir.status(name)? {
-        Some(status) if status.kind == Kind::File && status.bytes == entry.bytes => {}
-        _ => return Ok(false),
-    }
-    Ok(digest(dir, name)? == entry.sha256)
+/// Whether `name` in `dir` is a regular file of this size and digest.
+pub(super) fn has(dir: &Dir, name: &OsStr, bytes: u64, sha256: &str) -> io::Result<bool> {
+    let status = dir.status(name)?;
+    Ok(
+        status.is_some_and(|it| it.kind == Kind::File && it.bytes == bytes)
+            && digest(dir, name)? == sha256,
+    )
 }
 
 /// Digests of the files that were read in this run: what is replaced is looked at before a computation, before it is
