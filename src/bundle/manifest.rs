@@ -498,8 +498,8 @@ pub struct LeftOut {
     /// Why it is not needed.
     pub why: String,
     /// The error this costs, relative to the largest force per ampere at the points unless `why`
-    /// says otherwise; 0 where it costs none.
-    pub error_cost: f64,
+    /// says otherwise; 0 where it costs none, null where it is not known.
+    pub error_cost: Option<f64>,
 }
 
 #[cfg(test)]

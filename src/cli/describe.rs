@@ -159,10 +159,10 @@ pub fn left_out(parts: &[LeftOut]) -> String {
     let lines: Vec<String> = parts
         .iter()
         .map(|part| {
-            let cost = if part.error_cost == 0.0 {
-                "costs no accuracy".to_owned()
-            } else {
-                format!("costs {}", error(part.error_cost))
+            let cost = match part.error_cost {
+                Some(0.0) => "costs no accuracy".to_owned(),
+                Some(cost) => format!("costs {}", error(cost)),
+                None => "its cost is not known".to_owned(),
             };
             format!("{}: {}; {cost}", part.what, part.why)
         })

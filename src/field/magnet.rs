@@ -125,15 +125,15 @@ pub enum NoRule {
     #[error("the magnet's size, its distance and the tolerance must be positive numbers")]
     NotANumber,
     /// The magnet touches a source or overlaps it.
-    #[error("the magnet touches a field source or overlaps it (gap {gap_m:e} m)")]
+    #[error("the magnet touches a field source or overlaps it: it may be {:.3} mm below its top", gap_m.abs() * 1e3)]
     Touches {
         /// Gap between magnet and source, m.
         gap_m: f64,
     },
     /// The gap to the nearest source is too small for the tolerance.
     #[error(
-        "the gap of {gap_m:e} m between magnet and field source needs more than {MOST_NODES} points \
-         for a relative tolerance of {tolerance:e}"
+        "the gap of {:.6} mm between magnet and field source needs more than {MOST_NODES} points \
+         for a relative tolerance of {tolerance:e}", gap_m * 1e3
     )]
     TooClose {
         /// Gap between magnet and source, m.

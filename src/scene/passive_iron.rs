@@ -206,8 +206,8 @@ pub(super) fn magnet_of(scene: &Scene) -> ([f64; 3], Option<Cylinder>) {
 
 pub(super) fn too_close(region: Region, fault: NoPull) -> RunError {
     RunError::Input(format!(
-        "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet or the \
-         workspace",
+        "the pull of the unpowered steel on a magnet whose centre is {:.3} mm high or higher: {fault}; raise the object, \
+         or lower the steel",
         region.z_m[0] * 1e3
     ))
 }

@@ -445,11 +445,11 @@ const FORGERIES: &[Forgery] = &[
         p.manifest.left_out.push(LeftOut {
             what: "gravity".into(),
             why: "not needed".into(),
-            error_cost: 0.0,
+            error_cost: Some(0.0),
         });
     }),
     ("the cost of leaving out", Noticed, |p| {
-        p.manifest.left_out[0].error_cost = 0.5
+        p.manifest.left_out[0].error_cost = Some(0.5)
     }),
     ("the tolerance of the run", Noticed, |p| {
         p.options().tolerance = Some(1e-3);

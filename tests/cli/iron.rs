@@ -226,6 +226,49 @@ fn the_pull_of_cores_on_a_plate_is_counted_and_verified() {
     assert!(on_plate < alone && alone < 0.0, "{on_plate} {alone}");
 }
 
+/// It cost nothing, without a word; and there was no variant of all.
+#[test]
+fn steel_above_the_object_leaves_its_pull_unknown() {
+    let place = Place::new();
+    place.write("flat.toml", FLAT);
+    let wall = "[[iron]]\nshape = \"box\"\nsize_mm = [5, 5, 20]\ncenter_mm = [400, 0, 20]\n";
+    design_of(&place, 1, wall);
+    let args = [
+        "calibrate",
+        "design.toml",
+        "flat.toml",
+        "--tolerance",
+        "0.1",
+    ];
+    let ran = place.run(&args).ends(0);
+    assert!(ran.err.contains("its size is not known"), "{}", ran.err);
+    assert!(ran.out.contains("its cost is not known"), "{}", ran.out);
+    let manifest: Value =
+        serde_json::from_str(&place.text("results/pair/flat/manifest.json")).unwrap();
+    let left = manifest["left_out"].as_array().unwrap();
+    let pull = left
+        .iter()
+        .find(|part| part["what"] == "pull of the unpowered steel");
+    assert!(pull.unwrap()["error_cost"].is_null(), "{left:?}");
+    let args = [
+        "lambda",
+        "design.toml",
+        "flat.toml",
+        "--variants",
+        "--format",
+        "json",
+    ];
+    let result = place
+        .run(&[&args[..], &["--tolerance", "0.1"]].concat())
+        .ends(0);
+    assert!(result.json()["variants"].as_array().unwrap().len() > 1);
+    assert!(
+        result.out.contains("no variant with the steel's pull"),
+        "{}",
+        result.out
+    );
+}
+
 #[test]
 fn one_coil_is_optimised_without_its_plate_and_says_so() {
     let place = Place::new();

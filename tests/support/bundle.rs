@@ -254,7 +254,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         left_out: vec![LeftOut {
             what: "coil 2".to_owned(),
             why: "carries no current".to_owned(),
-            error_cost: 0.0,
+            error_cost: Some(0.0),
         }],
         accuracy,
         files: Vec::new(),

@@ -71,8 +71,8 @@ impl IgnoredPull {
     pub(crate) fn left_out(&self) -> LeftOut {
         const OFF: &str = "magnet.passive_force = false";
         let (why, error_cost) = match self {
-            Self::Measured(pull) => (format!("{OFF}; {}", pull.size()), pull.cost()),
-            Self::Unknown(why) => (format!("{OFF}; its size is not known: {why}"), 0.0),
+            Self::Measured(pull) => (format!("{OFF}; {}", pull.size()), Some(pull.cost())),
+            Self::Unknown(why) => (format!("{OFF}; its size is not known: {why}"), None),
         };
         LeftOut {
             what: "pull of the unpowered steel".to_owned(),
@@ -85,14 +85,17 @@ impl IgnoredPull {
     pub(crate) fn warning(&self, jnd: f64) -> Option<String> {
         match self {
             Self::Measured(pull) => pull.warning(jnd),
-            Self::Unknown(_) => None,
+            Self::Unknown(why) => Some(format!(
+                "the pull of the unpowered steel is left out (magnet.passive_force = false), and its size is not \
+                 known: {why}"
+            )),
         }
     }
 }
 
 /// The sideways pull where the upward one is counted; `None` where it is not, or without currents.
 pub(crate) fn sideways_left_out(file: &LambdaFile) -> Option<LeftOut> {
-    let error_cost = file.sideways?.pull_share?;
+    let error_cost = Some(file.sideways?.pull_share?);
     Some(LeftOut {
         what: SIDEWAYS_PULL.to_owned(),
         why: "requests and currents count the upward one alone; the cost is relative to the requested force, \
@@ -187,9 +190,13 @@ mod tests {
         for part in ["27.5 mN", "98.6 %", "point 1"] {
             assert!(entry.why.contains(part), "{}", entry.why);
         }
-        assert!((entry.error_cost - 0.0275 / 0.063).abs() < 1e-12);
+        assert!((entry.error_cost.unwrap() - 0.0275 / 0.063).abs() < 1e-12);
         assert!(pull.warning(0.07).is_some_and(|w| w.contains("98.6 %")));
         assert!(pull.warning(1.0).is_none());
+        // Not known is not nothing: it was 0, without a word on the screen.
+        let unknown = IgnoredPull::Unknown("a wall beside the array is higher".to_owned());
+        assert_eq!(unknown.left_out().error_cost, None);
+        assert!(unknown.warning(0.07).is_some_and(|w| w.contains("a wall")));
         // Below what a finger feels there is nothing to warn of.
         assert!(
             IgnoredPull::Measured(Measured::new(&[7e-4], 0.1, &[0.03]))

@@ -51,7 +51,7 @@ impl NeededMap {
             left_out.push(LeftOut {
                 what: what.to_owned(),
                 why: why.to_owned(),
-                error_cost: 0.0,
+                error_cost: Some(0.0),
             });
         }
         let driven = needed_coils(scene);
@@ -59,7 +59,7 @@ impl NeededMap {
             left_out.push(LeftOut {
                 what: format!("{} coils", scene.coils.len() - driven.len()),
                 why: "their current limits are zero".to_owned(),
-                error_cost: 0.0,
+                error_cost: Some(0.0),
             });
         }
         let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
@@ -124,7 +124,7 @@ fn drop_weak_coils(
         why: "at their largest currents together they change no force on the map by more than \
               this part of the largest that one coil gives"
             .to_owned(),
-        error_cost: weak / strongest,
+        error_cost: Some(weak / strongest),
     });
     let retain = |values: &mut Vec<f64>, components: usize| {
         let size = (nodes * components).max(1);
@@ -196,7 +196,7 @@ fn needed_grid(
                 "farther than {} mm from every point of the object",
                 reach_m * 1000.0
             ),
-            error_cost: 0.0,
+            error_cost: Some(0.0),
         });
     }
     grid

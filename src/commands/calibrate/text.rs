@@ -231,7 +231,10 @@ fn left_out(report: &CalibrateReport) -> String {
             };
         }
         let costs: Vec<String> = (of.iter())
-            .map(|(shape, part)| format!("{shape} {}", share(part.error_cost)))
+            .map(|(shape, part)| {
+                let cost = part.error_cost.map(share);
+                format!("{shape} {}", cost.unwrap_or_else(|| "not known".to_owned()))
+            })
             .collect();
         let why = first.why.split(';').next().unwrap_or_default();
         format!("{what}: {why}; costs {}", costs.join(", "))

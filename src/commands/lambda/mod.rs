@@ -487,10 +487,11 @@ pub(crate) fn solve_at(
     let positions = &points.positions_m;
     let forces_n_per_a = field.forces_n_per_a("forces", scene, solved, positions, progress)?;
     let counts = scene.design.magnet.passive_force;
-    let pull = if counts || options.variants {
-        passive::pull(scene, positions, false)?
-    } else {
-        None
+    let wanted = (counts || options.variants).then(|| passive::pull(scene, positions, false));
+    // A variant alone can do without it.
+    let (pull, unknown) = match wanted.transpose() {
+        Err(RunError::Input(why)) if !counts => (None, Some(why)),
+        pull => (pull?.flatten(), None),
     };
     let passive_n = pull.as_ref().map(|pull| pull.forces_z_n(positions));
     progress.begin("lambda", 1);
@@ -524,6 +525,8 @@ pub(crate) fn solve_at(
     let pull = pull.filter(|_| counts).map(|pull| passive::accuracy(&pull));
     let mut report = posed.report(passive_n.as_deref(), pull, progress)?;
     report.accuracy_missed = missed(&report.file.accuracy, solved.tolerance);
+    let unknown = unknown.map(|why| format!("no variant with the steel's pull: {why}"));
+    report.warnings.extend(unknown);
     Ok(report)
 }
 

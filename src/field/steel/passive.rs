@@ -49,7 +49,7 @@ pub enum NoPull {
     )]
     NotANumber,
     /// The region reaches down to the steel's top.
-    #[error("the magnet may touch the steel (gap {gap_m:e} m): the pull is known above it only")]
+    #[error("it may be {:.3} mm below the top of the highest steel, above which alone the pull is known", gap_m.abs() * 1e3)]
     TouchesSteel {
         /// Height above the steel, m.
         gap_m: f64,

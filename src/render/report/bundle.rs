@@ -220,10 +220,10 @@ fn sources(object: &CalibratedObject, files: &[&str]) -> Section {
     });
     if !object.manifest.left_out.is_empty() {
         let row = |left: &LeftOut| -> Vec<Cell> {
-            let cost = if left.error_cost > 0.0 {
-                percent(left.error_cost)
-            } else {
-                "none".to_owned()
+            let cost = match left.error_cost {
+                Some(0.0) => "none".to_owned(),
+                Some(cost) => percent(cost),
+                None => "not known".to_owned(),
             };
             vec![
                 left.what.as_str().into(),
