@@ -10,6 +10,9 @@ pub(crate) const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
 /// Columns of a second finger.
 const SECOND_COLUMNS: [&str; 3] = ["x2_m", "y2_m", "z2_m"];
 
+/// Beyond this size of a time, s, or position, m, sums over rows are no numbers.
+const MOST: f64 = 1e30;
+
 /// Positions of the magnet's centre over time, of one finger or two; times never decrease.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
@@ -63,7 +66,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// As [`super::read_table::read_columns`]; no rows; the first time that is smaller than the one
-    /// before it; a duration beyond the numbers.
+    /// before it; times and positions beyond 1e30.
     pub fn read(name: &str, source: impl Read) -> Result<Self, TableError> {
         let (columns, lines) = read_numbered(name, source, &TRAJECTORY_COLUMNS, &SECOND_COLUMNS)?;
         let t_s = &columns[0];
@@ -79,11 +82,14 @@ impl Trajectory {
                 t_s[row]
             )));
         }
-        let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
-        if !(last - first).is_finite() {
-            return Err(TableError::one(format!(
-                "{name}: column t_s: from {first} to {last} is not a time in seconds"
-            )));
+        let names = TRAJECTORY_COLUMNS.iter().chain(&SECOND_COLUMNS);
+        for (column, values) in names.zip(&columns) {
+            if let Some(row) = values.iter().position(|value| value.abs() > MOST) {
+                return Err(TableError::one(format!(
+                    "{name}:{}: column {column}: {:e} is beyond {MOST:e}; times are in seconds, positions in metres",
+                    lines[row], values[row]
+                )));
+            }
         }
         let finger = |axes: &[Vec<f64>]| match axes {
             [x, y, z] => (0..t_s.len()).map(|row| [x[row], y[row], z[row]]).collect(),
@@ -164,7 +170,11 @@ mod tests {
             ),
             (
                 "t_s,x_m,y_m,z_m\n-1e308,0,0,0.05\n1e308,0,0,0.05\n",
-                "is not a time in seconds",
+                "finger.csv:2: column t_s: -1e308 is beyond 1e30",
+            ),
+            (
+                "t_s,x_m,y_m,z_m\n0,0,0,0.05\n1,1e306,0,0.05\n",
+                "finger.csv:3: column x_m: 1e306 is beyond 1e30",
             ),
         ] {
             let fault = read(text).unwrap_err();
