@@ -504,7 +504,7 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
             return fail(a, "has_height", "must hold 0 or 1");
     if (load_requested(b, a) || load_robust(b, a))
         return -1;
-    if (!(b->scratch = calloc(b->coil_count + 1, 21 * sizeof(double)))) /* see fluxform_currents.c */
+    if (!(b->scratch = calloc(b->coil_count + 1, 22 * sizeof(double)))) /* see fluxform_currents.c */
         return fail(a, "", "no memory");
     b->has_rendering = 1;
     return 0;

@@ -407,7 +407,7 @@ int fluxform_allocate_vector(fluxform_bundle *b, const double *force_per_ampere,
 {
     size_t n = b->coil_count;
     double largest = 0, least = INFINITY, weights[3];
-    int nothing = wanted[0] == 0 && wanted[1] == 0 && wanted[2] == 0;
+    int nothing = wanted[0] == 0 && wanted[1] == 0 && wanted[2] == 0, proven, answer;
     vector_problem p;
     weights[0] = weights[1] = b->sideways_weight;
     weights[2] = 1;
@@ -440,7 +440,15 @@ int fluxform_allocate_vector(fluxform_bundle *b, const double *force_per_ampere,
     for (size_t k = 0; k < 3; k++)
         p.target[k] = wanted[k] * weights[k] * (1 / largest);
     p.target[3] = b->has_total_current_max ? b->total_current_max_a : INFINITY;
-    return solve_vector(&p);
+    answer = solve_vector(&p, &proven);
+    if (proven || !even_out(&p))
+        return answer;
+    p.currents = b->scratch + 21 * n;
+    if (solve_vector(&p, &proven) == FLUXFORM_OK && proven) {
+        memcpy(currents, p.currents, n * sizeof *currents);
+        answer = FLUXFORM_OK;
+    }
+    return answer;
 }
 
 /* As fluxform_currents, for all three components of the force. */

@@ -42,38 +42,56 @@ static double dot(const double *a, const double *b, int rows)
     return sum;
 }
 
-/* Solves a symmetric positive definite system of n rows whose lower triangle is given; 0 where a pivot
- * is at most `least` of its diagonal entry. */
-static int solve_cholesky(double lower[4][4], const double *right, int n, double least, double *x)
+/* S L of a matrix S L L' S with the diagonal matrix S and the lower triangle L. */
+typedef struct {
+    double scale[4], l[4][4];
+} cholesky;
+
+/* Of a matrix of n rows whose lower triangle is given; 0 where a pivot is at most `least` of its diagonal entry. */
+static int factorise(cholesky *f, double lower[4][4], int n, double least)
 {
-    double l[4][4], scale[4];
     for (int a = 0; a < n; a++) {
-        scale[a] = sqrt(lower[a][a]);
-        if (!(scale[a] > 0 && isfinite(scale[a])))
+        f->scale[a] = sqrt(lower[a][a]);
+        if (!(f->scale[a] > 0 && isfinite(f->scale[a])))
             return 0;
     }
     for (int a = 0; a < n; a++)
         for (int b = 0; b <= a; b++) {
-            double value = lower[a][b] / (scale[a] * scale[b]) - dot(l[a], l[b], b);
+            double value = lower[a][b] / (f->scale[a] * f->scale[b]) - dot(f->l[a], f->l[b], b);
             if (a != b)
-                l[a][b] = value / l[b][b];
+                f->l[a][b] = value / f->l[b][b];
             else if (value <= least)
                 return 0;
             else
-                l[a][a] = sqrt(value);
+                f->l[a][a] = sqrt(value);
         }
+    return 1;
+}
+
+/* x = (S L)^-1 right; they may be the same. */
+static void forward(const cholesky *f, const double *right, int n, double *x)
+{
+    for (int a = 0; a < n; a++)
+        x[a] = (right[a] / f->scale[a] - dot(f->l[a], x, a)) / f->l[a][a];
+}
+
+/* Solves a symmetric positive definite system of n rows; see factorise. */
+static int solve_cholesky(double lower[4][4], const double *right, int n, double least, double *x)
+{
+    cholesky f;
+    if (!factorise(&f, lower, n, least))
+        return 0;
     for (int a = 0; a < 4; a++)
         x[a] = 0;
-    for (int a = 0; a < n; a++)
-        x[a] = (right[a] / scale[a] - dot(l[a], x, a)) / l[a][a];
+    forward(&f, right, n, x);
     for (int a = n - 1; a >= 0; a--) {
         double known = 0;
         for (int k = a + 1; k < n; k++)
-            known += l[k][a] * x[k];
-        x[a] = (x[a] - known) / l[a][a];
+            known += f.l[k][a] * x[k];
+        x[a] = (x[a] - known) / f.l[a][a];
     }
     for (int a = 0; a < n; a++)
-        x[a] /= scale[a];
+        x[a] /= f.scale[a];
     return 1;
 }
 
@@ -364,7 +382,8 @@ static void lower_to_sum(vector_problem *p)
         p->currents[i] = p->lower[i] + share * (p->currents[i] - p->lower[i]);
 }
 
-static int solve_vector(vector_problem *p)
+/* Leaves the currents; whether they give the force, and whether that is proven. */
+static int solve_vector(vector_problem *p, int *proven)
 {
     double size = 0, stiffness = 0, most = 0, within_reach, y[4] = {0, 0, 0, 0};
     for (size_t i = 0; i < p->n; i++) {
@@ -374,6 +393,7 @@ static int solve_vector(vector_problem *p)
         most += sqrt(squared) * fmax(p->upper[i], -p->lower[i]);
     }
     /* The multipliers grow with the force beyond reach; the sum's limit holds all the same. */
+    *proven = 1;
     within_reach = fmin(most / sqrt(dot(p->target, p->target, 3)), 1);
     for (double share = EPS_FIRST;; share *= EPS_FACTOR) {
         int rows = 3;
@@ -392,9 +412,31 @@ static int solve_vector(vector_problem *p)
             for (size_t i = 0; i < p->n; i++)
                 p->currents[i] = clamp(p->conductance[i] * dot(p->rows + 4 * i, y, rows), p->lower[i], p->upper[i]);
             lower_to_sum(p);
+            *proven = 0;
             return reached(p);
         }
     }
+}
+
+/* Changes rows and target to coordinates in which the coils without limits give alike in every direction; 0 where
+ * they give nothing in one, or nearly. */
+static int even_out(vector_problem *p)
+{
+    double product[4][4];
+    cholesky f;
+    memset(product, 0, sizeof product);
+    for (size_t i = 0; i < p->n; i++)
+        for (int k = 0; k < 3; k++)
+            for (int l = 0; l <= k; l++)
+                product[k][l] += p->conductance[i] * p->rows[4 * i + (size_t)k] * p->rows[4 * i + (size_t)l];
+    for (int k = 0; k < 3; k++)
+        product[k][k] = product[k][k] == 0 ? 1 : product[k][k];
+    if (!factorise(&f, product, 3, PIVOT))
+        return 0;
+    for (size_t i = 0; i < p->n; i++)
+        forward(&f, p->rows + 4 * i, 3, p->rows + 4 * i);
+    forward(&f, p->target, 3, p->target);
+    return 1;
 }
 
 #endif

@@ -380,12 +380,39 @@ function [currents, met] = allocate_vector(per_ampere, wanted, r, lower, upper, 
     d.upper = upper.';
     d.at = zeros(numel(r), 1);
     d.currents = zeros(numel(r), 1);
+    [d, met, proven] = solve_dual(d);
+    currents = d.currents.';
+    if proven
+        return
+    end
+    % In coordinates in which the coils without limits give alike in every direction.
+    product = (d.rows(:, 1:3).' .* d.conductance.') * d.rows(:, 1:3);
+    product(1:4:9) = product(1:4:9) + (product(1:4:9) == 0);
+    [scale, factor] = factored(product, 1e-13);
+    if isempty(scale)
+        return
+    end
+    d.rows(:, 1:3) = forward(scale, factor, d.rows(:, 1:3).').';
+    d.target(1:3) = forward(scale, factor, d.target(1:3));
+    [d, given, proven] = solve_dual(d);
+    if given && proven
+        currents = d.currents.';
+        met = true;
+    end
+end
+
+function [d, met, proven] = solve_dual(d)
+% Leaves the currents; whether they give the force, and whether that is proven.
     size_of_force = sum(d.conductance .* sum(d.rows(:, 1:3) .^ 2, 2));
-    stiffness = sum(d.conductance);
+    most = sum(sqrt(sum(d.rows(:, 1:3) .^ 2, 2)) .* max(d.upper, -d.lower));
+    % The multipliers grow with the force beyond reach; the sum's limit holds all the same.
+    within_reach = min(most / norm(d.target(1:3)), 1);
+    of_sum = 1e-6 * within_reach * sum(d.conductance);
+    proven = true;
     y = zeros(4, 1);
     share = 1e-7;
     while true
-        d.eps = share * [size_of_force; size_of_force; size_of_force; 1e-6 * stiffness];
+        d.eps = share * [size_of_force; size_of_force; size_of_force; of_sum];
         n = 3;
         y(4) = 0;
         [d, y] = climb(d, y, n);
@@ -395,7 +422,7 @@ function [currents, met] = allocate_vector(per_ampere, wanted, r, lower, upper, 
         end
         [d, met] = finish_exactly(d, y, n);
         if met
-            break
+            return
         end
         [d, nearest] = finish_nearest(d, n);
         if ~nearest && share * 1e-3 >= 1e-14
@@ -403,12 +430,16 @@ function [currents, met] = allocate_vector(per_ampere, wanted, r, lower, upper, 
             continue
         end
         if ~nearest
+            proven = false;
             d.currents = min(max(d.conductance .* (d.rows(:, 1:n) * y(1:n)), d.lower), d.upper);
+            above = d.currents - d.lower;
+            if sum(d.currents) > d.target(4)
+                d.currents = d.lower + above * (d.target(4) - sum(d.lower)) / sum(above);
+            end
         end
         met = vector_met(d);
-        break
+        return
     end
-    currents = d.currents.';
 end
 
 function [d, slope, curvature, changed] = dual_place(d, y, n, all_free)
@@ -610,8 +641,24 @@ end
 function x = cholesky(matrix, right, least)
 % Solves a symmetric positive definite system; empty where a pivot is at most `least` of its entry.
     x = [];
+    [scale, factor] = factored(matrix, least);
+    if isempty(scale)
+        return
+    end
+    x = forward(scale, factor, right);
+    n = numel(scale);
+    for a = n:-1:1
+        x(a) = (x(a) - sum(factor(a + 1:n, a) .* x(a + 1:n, 1))) / factor(a, a);
+    end
+    x = x ./ scale;
+end
+
+function [scale, factor] = factored(matrix, least)
+% S and L of a symmetric positive definite matrix S L L' S; empty as cholesky.
+    factor = [];
     scale = sqrt(diag(matrix));
     if ~isreal(scale) || ~all(scale > 0 & isfinite(scale))
+        scale = [];
         return
     end
     n = numel(scale);
@@ -623,20 +670,21 @@ function x = cholesky(matrix, right, least)
             if a ~= b
                 factor(a, b) = value / factor(b, b);
             elseif ~(value > least)
+                scale = [];
                 return
             else
                 factor(a, a) = sqrt(value);
             end
         end
     end
-    found = right ./ scale;
-    for a = 1:n
-        found(a) = (found(a) - sum(factor(a, 1:a - 1).' .* found(1:a - 1, 1))) / factor(a, a);
+end
+
+function x = forward(scale, factor, right)
+% (S L)^-1 times columns.
+    x = right ./ scale;
+    for a = 1:numel(scale)
+        x(a, :) = (x(a, :) - factor(a, 1:a - 1) * x(1:a - 1, :)) / factor(a, a);
     end
-    for a = n:-1:1
-        found(a) = (found(a) - sum(factor(a + 1:n, a) .* found(a + 1:n, 1))) / factor(a, a);
-    end
-    x = found ./ scale;
 end
 
 % Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is told in

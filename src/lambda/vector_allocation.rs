@@ -19,7 +19,9 @@
 //! bounded for every `f` and continuous in it; `eps` is far below what decides which coils are at a
 //! limit. With those known, the remaining currents are solved again without `eps`: exactly, or where
 //! `f` is out of reach as those of the nearest force in the norm `|w (G I - f)|`. The conditions of
-//! optimality are checked; where they fail, `eps` was too large and becomes smaller.
+//! optimality are checked; where they fail, `eps` was too large and becomes smaller. Beside directions in which the
+//! coils give much, those in which they give little need one below all rounding: if nothing is proven, the same is
+//! solved in coordinates in which they give alike in every direction. What is exact in one is so in the other.
 //!
 //! Nothing is allocated on the heap after [`VectorAllocator::new`].
 
@@ -173,8 +175,12 @@ impl VectorAllocator {
         }
         let mut target = weighted(requested_n);
         target[3] = self.limits.total_a();
-        let (reach, proven) = self.solve(&target);
+        let (mut reach, mut proven) = self.solve(&target);
         out.copy_from_slice(&self.currents);
+        if !proven && self.even_out(&mut target) && self.solve(&target) == (Reach::Reached, true) {
+            out.copy_from_slice(&self.currents);
+            (reach, proven) = (Reach::Reached, true);
+        }
         let mut force_n = [0.0; 3];
         for (g, i) in given.iter().zip(&*out) {
             for (sum, part) in force_n.iter_mut().zip(g) {
@@ -186,6 +192,20 @@ impl VectorAllocator {
             force_n,
             proven,
         }
+    }
+
+    /// Changes rows and target to [`EvenAxes`]; whether there are any.
+    fn even_out(&mut self, target: &mut Rows) -> bool {
+        let coils = self.rows.iter().zip(&self.conductance);
+        let Some(axes) = EvenAxes::new(coils.map(|([x, y, z, _], c)| ([*x, *y, *z], *c))) else {
+            return false;
+        };
+        for row in self.rows.iter_mut().chain([target]) {
+            let [x, y, z, sum] = *row;
+            let [x, y, z] = axes.of([x, y, z]);
+            *row = [x, y, z, sum];
+        }
+        true
     }
 
     /// Leaves the solution in `self.currents`.
@@ -572,39 +592,95 @@ fn dot(a: &Rows, b: &Rows, rows: usize) -> f64 {
     (0..rows).map(|k| a[k] * b[k]).sum()
 }
 
+/// Coordinates of forces in which coils without limits give alike in every direction for the same power.
+pub(crate) struct EvenAxes(Factor);
+
+impl EvenAxes {
+    /// For coils of these forces per ampere and conductances; `None` where they give nothing in a direction, or nearly.
+    pub(crate) fn new(coils: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<Self> {
+        let mut product = [[0.0; 4]; 4];
+        for (force, conductance) in coils {
+            for k in 0..3 {
+                for l in 0..=k {
+                    product[k][l] += conductance * force[k] * force[l];
+                }
+            }
+        }
+        // An axis along which no coil gives anything stays as it is.
+        for k in 0..3 {
+            if product[k][k] == 0.0 {
+                product[k][k] = 1.0;
+            }
+        }
+        Factor::new(&product, 3, PIVOT).map(Self)
+    }
+
+    /// A force in them.
+    pub(crate) fn of(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let [x, y, z, _] = self.0.forward(&[x, y, z, 0.0], 3);
+        [x, y, z]
+    }
+}
+
 /// Solves a symmetric positive definite system of `n` rows whose lower triangle is given; `None`
 /// where a pivot is at most `least` of its diagonal entry.
 fn cholesky_solve(lower: &[Rows; 4], right: &Rows, n: usize, least: f64) -> Option<Rows> {
-    let mut l = *lower;
-    let scale: Rows = std::array::from_fn(|k| if k < n { l[k][k].sqrt() } else { 1.0 });
-    if scale[..n].iter().any(|s| !(*s > 0.0 && s.is_finite())) {
-        return None;
-    }
-    for a in 0..n {
-        for b in 0..=a {
-            let mut value = l[a][b] / (scale[a] * scale[b]);
-            value -= dot(&l[a], &l[b], b);
-            if a == b {
-                if value <= least {
-                    return None;
+    let factor = Factor::new(lower, n, least)?;
+    Some(factor.backward(&factor.forward(right, n), n))
+}
+
+/// `S L` of a matrix `S L L' S` with the diagonal matrix `S` and the lower triangle `L`.
+struct Factor {
+    scale: Rows,
+    l: [Rows; 4],
+}
+
+impl Factor {
+    /// Of a matrix of `n` rows whose lower triangle is given; `None` where a pivot is at most `least` of its
+    /// diagonal entry.
+    fn new(lower: &[Rows; 4], n: usize, least: f64) -> Option<Self> {
+        let mut l = *lower;
+        let scale: Rows = std::array::from_fn(|k| if k < n { l[k][k].sqrt() } else { 1.0 });
+        if scale[..n].iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+            return None;
+        }
+        for a in 0..n {
+            for b in 0..=a {
+                let mut value = l[a][b] / (scale[a] * scale[b]);
+                value -= dot(&l[a], &l[b], b);
+                if a == b {
+                    if value <= least {
+                        return None;
+                    }
+                    l[a][a] = value.sqrt();
+                } else {
+                    l[a][b] = value / l[b][b];
                 }
-                l[a][a] = value.sqrt();
-            } else {
-                l[a][b] = value / l[b][b];
             }
         }
+        Some(Self { scale, l })
     }
-    let mut x = [0.0; 4];
-    for a in 0..n {
-        let known: f64 = (0..a).map(|k| l[a][k] * x[k]).sum();
-        x[a] = (right[a] / scale[a] - known) / l[a][a];
+
+    /// `(S L)^-1 right`.
+    fn forward(&self, right: &Rows, n: usize) -> Rows {
+        let mut x = [0.0; 4];
+        for a in 0..n {
+            let known: f64 = (0..a).map(|k| self.l[a][k] * x[k]).sum();
+            x[a] = (right[a] / self.scale[a] - known) / self.l[a][a];
+        }
+        x
     }
-    for a in (0..n).rev() {
-        let known: f64 = (a + 1..n).map(|k| l[k][a] * x[k]).sum();
-        x[a] = (x[a] - known) / l[a][a];
+
+    /// `(L' S)^-1 right`.
+    fn backward(&self, right: &Rows, n: usize) -> Rows {
+        let mut x = *right;
+        for a in (0..n).rev() {
+            let known: f64 = (a + 1..n).map(|k| self.l[k][a] * x[k]).sum();
+            x[a] = (x[a] - known) / self.l[a][a];
+        }
+        for a in 0..n {
+            x[a] /= self.scale[a];
+        }
+        x
     }
-    for a in 0..n {
-        x[a] /= scale[a];
-    }
-    Some(x)
 }

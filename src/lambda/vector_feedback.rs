@@ -23,7 +23,7 @@ use super::certificate::best_within_limits;
 use super::feedback::{FeedbackError, Reachable};
 use super::problem::{ForceProblem, Settings};
 use super::sideways::SIDEWAYS_WEIGHT;
-use super::vector_allocation::VectorAllocator;
+use super::vector_allocation::{EvenAxes, VectorAllocator};
 
 /// Points handled together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 1024;
@@ -31,6 +31,8 @@ const CHUNK_POINTS: usize = 1024;
 const TURNS: usize = 100;
 /// Steps below this share are none.
 const STILL: f64 = 1e-12;
+/// Steps the other way up to this share are rounding.
+const ASTRAY: f64 = 1e-10;
 
 /// Ends below this share of what the force along the request allows are none.
 const NOTHING: f64 = 1e-9;
@@ -171,6 +173,12 @@ struct Search<'a> {
     currents: Vec<f64>,
 }
 
+/// The forces that are requested over lambda, and the force without currents, in any coordinates.
+struct Ray {
+    request: [f64; 3],
+    offset_n: [f64; 3],
+}
+
 /// The result of asking for a lambda at a point.
 enum Asked {
     Given,
@@ -194,16 +202,17 @@ impl<'a> Search<'a> {
         fluxform_base::progress::poll();
         let rows = self.problem.point(point);
         rows.fill(&mut self.rows);
+        let ray = self.even_ray(&rows);
         let height = self.problem.upward.height_m[point];
         if height == 0.0 {
             // Nothing is requested: that must be possible.
-            return match self.asked(&rows, 0.0) {
+            return match self.asked(&ray, 0.0) {
                 Asked::Given => (0.0, 0.0),
                 Asked::Crosses(_) => (1.0, 1.0),
             };
         }
-        let bound = self.bound(&rows);
-        let Some(most) = self.end(&rows, bound, |next, now| next < now) else {
+        let bound = self.bound(&ray);
+        let Some(most) = self.end(&ray, bound, |next, now| next < now) else {
             return (0.0, -height);
         };
         // Beside the cone of all forces the cuts come ever nearer to no force at all.
@@ -211,56 +220,98 @@ impl<'a> Search<'a> {
             return (0.0, 0.0);
         }
         let least = if most > 0.0 {
-            self.end(&rows, 0.0, |next, now| next > now)
+            self.end(&ray, 0.0, |next, now| next > now)
         } else {
             Some(0.0)
         };
         (least.unwrap_or(most) * height, most * height)
     }
 
+    /// Changes `self.rows`, those of the point, to axes along which the coils give alike, and gives the ray of the
+    /// requested forces in them.
+    fn even_ray(&mut self, rows: &Rows) -> Ray {
+        let offset_n = [0.0, 0.0, rows.offset_n];
+        let coils = self.rows.iter().zip(self.problem.upward.resistance_ohm);
+        match EvenAxes::new(coils.map(|(row, ohm)| (*row, 1.0 / ohm))) {
+            Some(axes) => {
+                for row in &mut self.rows {
+                    *row = axes.of(*row);
+                }
+                Ray {
+                    request: axes.of(rows.request),
+                    offset_n: axes.of(offset_n),
+                }
+            }
+            None => Ray {
+                request: rows.request,
+                offset_n,
+            },
+        }
+    }
+
     /// No lambda beyond it can be given: the force along the request is largest there.
-    fn bound(&self, rows: &Rows) -> f64 {
-        let [x, y, z] = rows.request;
+    fn bound(&self, ray: &Ray) -> f64 {
+        (self.most_along(ray.request) + dot(ray.request, ray.offset_n))
+            / dot(ray.request, ray.request)
+    }
+
+    /// The largest product of a direction and a force within the limits.
+    fn most_along(&self, [x, y, z]: [f64; 3]) -> f64 {
         let along: Vec<f64> = (self.rows.iter())
             .map(|row| x * row[0] + y * row[1] + z * row[2])
             .collect();
         let best = best_within_limits(&self.problem.upward, &along);
-        let most: f64 = along.iter().zip(&best).map(|(force, i)| force * i).sum();
-        (most + z * rows.offset_n) / (x * x + y * y + z * z)
+        along.iter().zip(&best).map(|(force, i)| force * i).sum()
     }
 
     /// The end of the lambdas that is met from `lambda` on; `None` where there is none on the `way`.
-    fn end(&mut self, rows: &Rows, from: f64, way: fn(f64, f64) -> bool) -> Option<f64> {
+    fn end(&mut self, ray: &Ray, from: f64, way: fn(f64, f64) -> bool) -> Option<f64> {
         let mut lambda = from;
         for _ in 0..TURNS {
-            let next = match self.asked(rows, lambda) {
-                Asked::Given => return Some(lambda),
-                Asked::Crosses(next) => next.filter(|next| way(*next, lambda))?,
+            let next = match self.asked(ray, lambda) {
+                Asked::Given => break,
+                Asked::Crosses(next) => next?,
             };
-            let still = (next - lambda).abs() <= STILL * lambda.abs().max(next.abs());
-            lambda = next;
-            if still {
-                break;
+            let step = (next - lambda).abs() / lambda.abs().max(next.abs());
+            match way(next, lambda) {
+                true if step > STILL => lambda = next,
+                // No lambda is given, or this one is the end and its nearest force too near to point anywhere.
+                false if step > ASTRAY => {
+                    let within = if way(0.0, 1.0) {
+                        1.0 - ASTRAY
+                    } else {
+                        1.0 + ASTRAY
+                    };
+                    let given = matches!(self.asked(ray, within * lambda), Asked::Given);
+                    return given.then_some(within * lambda);
+                }
+                _ => break,
             }
         }
         Some(lambda)
     }
 
-    fn asked(&mut self, rows: &Rows, lambda: f64) -> Asked {
-        let target = rows.of_currents(lambda);
+    fn asked(&mut self, ray: &Ray, lambda: f64) -> Asked {
+        let target: [f64; 3] = std::array::from_fn(|k| lambda * ray.request[k] - ray.offset_n[k]);
         let found = self
             .allocator
             .allocate(&self.rows, target, &mut self.currents);
         if found.reach == Reach::Reached {
             return Asked::Given;
         }
-        let nearest = found.force_n;
-        let normal: [f64; 3] = std::array::from_fn(|k| target[k] - nearest[k]);
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let [x, y, z] = nearest;
-        let crossing = dot(normal, [x, y, z + rows.offset_n]) / dot(normal, rows.request);
+        let normal: [f64; 3] = std::array::from_fn(|k| target[k] - found.force_n[k]);
+        // The nearest force is in the plane. Where another may be nearer, the plane goes through the farthest.
+        let most = match found.proven {
+            true => dot(normal, found.force_n),
+            false => self.most_along(normal),
+        };
+        let crossing = (most + dot(normal, ray.offset_n)) / dot(normal, ray.request);
         Asked::Crosses(Some(crossing).filter(|crossing| crossing.is_finite()))
     }
+}
+
+fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
+    a * x + b * y + c * z
 }
 
 /// Renders every point at `lambda_n_per_m`.

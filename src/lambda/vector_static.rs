@@ -81,7 +81,7 @@ pub struct WorstVector {
 /// The weight of sideways errors for a just-noticeable share of force and angle (degrees, 0 to 90).
 #[must_use]
 pub fn sideways_weight(jnd: f64, direction_jnd_deg: f64) -> f64 {
-    (jnd / direction_jnd_deg.to_radians().tan()).min(1.0)
+    jnd / direction_jnd_deg.to_radians().tan()
 }
 
 /// The rows of all points as those of one problem.

@@ -175,6 +175,29 @@ class Dual:
 
     def solve(self):
         """Whether the currents, which it leaves, give the force."""
+        reached, proven = self.attempt()
+        if proven or not self.even_out():
+            return reached
+        kept = self.currents
+        if self.attempt() == (True, True):
+            return True
+        self.currents = kept
+        return reached
+
+    def even_out(self):
+        """Changes rows and target to coordinates in which the coils without limits give alike in every direction;
+        whether they give something in each."""
+        product = (self.rows[:, :3].T * self.conductance) @ self.rows[:, :3]
+        np.fill_diagonal(product, np.where(np.diag(product) == 0, 1.0, np.diag(product)))
+        factored = _factored(product, self.PIVOT)
+        if factored is None:
+            return False
+        self.rows[:, :3] = _forward(factored, self.rows[:, :3].T).T
+        self.target[:3] = _forward(factored, self.target[:3])
+        return True
+
+    def attempt(self):
+        """Whether the currents, which it leaves, give the force, and whether that is proven."""
         size = np.sum(self.conductance * np.sum(self.rows[:, :3] ** 2, axis=1))
         most = np.sum(np.linalg.norm(self.rows[:, :3], axis=1) * np.maximum(self.upper, -self.lower))
         # The multipliers grow with the force beyond reach; the sum's limit holds all the same.
@@ -189,19 +212,31 @@ class Dual:
                 n = 4
                 self.climb(y, n)
             if self.finish_exactly(y, n):
-                return True
+                return True, True
             if self.finish_nearest(n):
-                return self.reached()
+                return self.reached(), True
             if share * self.EPS_FACTOR < self.EPS_LEAST:
                 alone = self.conductance * (self.rows[:, :n] @ y[:n])
                 self.currents = np.clip(alone, self.lower, self.upper)
                 self.lower_to_sum()
-                return self.reached()
+                return self.reached(), False
             share *= self.EPS_FACTOR
 
 
 def _cholesky(matrix, right, least):
     """Solves a symmetric positive definite system; None where a pivot is at most `least` of its entry."""
+    factored = _factored(matrix, least)
+    if factored is None:
+        return None
+    scale, factor = factored
+    x = _forward(factored, right)
+    for a in reversed(range(len(x))):
+        x[a] = (x[a] - factor[a + 1 :, a] @ x[a + 1 :]) / factor[a, a]
+    return x / scale
+
+
+def _factored(matrix, least):
+    """S and L of a symmetric positive definite matrix S L L' S; None as _cholesky."""
     scale = np.sqrt(np.diag(matrix))
     if not np.all((scale > 0) & np.isfinite(scale)):
         return None
@@ -215,9 +250,13 @@ def _cholesky(matrix, right, least):
                 return None
             else:
                 factor[a, a] = np.sqrt(value)
-    x = right / scale
+    return scale, factor
+
+
+def _forward(factored, right):
+    """(S L)^-1 times a column or columns."""
+    scale, factor = factored
+    x = (right.T / scale).T
     for a in range(len(x)):
         x[a] = (x[a] - factor[a, :a] @ x[:a]) / factor[a, a]
-    for a in reversed(range(len(x))):
-        x[a] = (x[a] - factor[a + 1 :, a] @ x[a + 1 :]) / factor[a, a]
-    return x / scale
+    return x
