@@ -13,6 +13,8 @@ pub enum Codes {
     Reading,
     /// Reads documents, writes files.
     Writing,
+    /// Reads a bundle, writes files.
+    Replaying,
     /// Verifies.
     Verifying,
     /// Writes files that need no input.
@@ -21,27 +23,35 @@ pub enum Codes {
     Measuring,
 }
 
+const BAD_INPUT: &str = "3    a bad input file: every fault is reported with its place";
+const UNMET_OR_UNWRITTEN: &str =
+    "4    a result that does not meet the request; or an output that exists or cannot be written";
+const INTERRUPTED: &str = "130  interrupted";
+const KEPT: &str = "130  interrupted; what was finished is kept";
+
 impl Codes {
-    fn lines(self) -> &'static str {
+    fn lines(self) -> &'static [&'static str] {
         match self {
-            Self::None => "",
-            Self::Reading => {
-                "\n  3    a bad input file: every fault is reported with its place\n  \
-                 4    a result that does not meet the request (see above); or an output that cannot be written\n  \
-                 130  interrupted"
-            }
-            Self::Writing => {
-                "\n  3    a bad input file: every fault is reported with its place\n  \
-                 4    a result that does not meet the request; or an output that exists or cannot be written\n  \
-                 130  interrupted; what was finished is kept"
-            }
-            Self::Verifying => "\n  3    not a bundle\n  5    a check failed\n  130  interrupted",
-            Self::Pages => "\n  4    an output exists or cannot be written",
-            Self::Measuring => {
-                "\n  4    an output exists or cannot be written; or a measurement failed\n  \
-                 5    a case of the catalogue failed\n  \
-                 130  interrupted"
-            }
+            Self::None => &[],
+            Self::Reading => &[
+                BAD_INPUT,
+                "4    a result that does not meet the request (see above); or an output that cannot be written",
+                INTERRUPTED,
+            ],
+            Self::Writing => &[BAD_INPUT, UNMET_OR_UNWRITTEN, KEPT],
+            Self::Replaying => &[
+                BAD_INPUT,
+                UNMET_OR_UNWRITTEN,
+                "5    the bundle is damaged or was changed",
+                KEPT,
+            ],
+            Self::Verifying => &["3    not a bundle", "5    a check failed", INTERRUPTED],
+            Self::Pages => &["4    an output exists or cannot be written"],
+            Self::Measuring => &[
+                "4    an output exists or cannot be written; or a measurement failed",
+                "5    a case of the catalogue failed",
+                INTERRUPTED,
+            ],
         }
     }
 }
@@ -49,10 +59,14 @@ impl Codes {
 /// Exit codes and examples: what is typed, and what for.
 #[must_use]
 pub fn page(codes: Codes, examples: &[(&str, &str)]) -> String {
-    let mut text = format!(
-        "Exit codes:\n  0    done\n  2    wrong usage{}\n\nExamples:",
-        codes.lines()
-    );
+    let mut text = "Exit codes:".to_owned();
+    for line in ["0    done", "2    wrong usage"]
+        .iter()
+        .chain(codes.lines())
+    {
+        text.push_str(&format!("\n  {line}"));
+    }
+    text.push_str("\n\nExamples:");
     for (command, purpose) in examples {
         text.push_str(&format!("\n  # {purpose}\n  {command}"));
     }

@@ -139,6 +139,19 @@ fn every_example_works() {
     }
 }
 
+/// `replay` did not say that it ends with 5 where the bundle is damaged.
+#[test]
+fn regression_a_command_that_reads_a_bundle_hid_an_exit_code() {
+    let place = Place::empty();
+    let pages = commands().into_iter().map(|path| help_of(&place, &path));
+    let reads_a_bundle = |page: &String| page.contains("<BUNDLE");
+    let pages: Vec<String> = pages.filter(reads_a_bundle).collect();
+    assert!(pages.len() >= 2);
+    for page in pages {
+        assert!(page.contains("\n  5    "), "{page}");
+    }
+}
+
 #[test]
 fn no_command_is_wrong_usage_and_so_is_an_unknown_one() {
     let place = Place::new();

@@ -39,7 +39,7 @@ const MOST_POSITIONS: f64 = 1e8;
 /// beyond the limits (saturated) or outside the map. A position is held until the next one; with
 /// --dynamics its row states the end of that time.
 #[derive(Debug, Args)]
-#[command(after_long_help = help::page(Codes::Writing, &[
+#[command(after_long_help = help::page(Codes::Replaying, &[
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
     ("fluxform replay results/seed_air/flat --synthesize explore --trajectory-out finger.csv",
      "an exploring finger made up"),
