@@ -172,7 +172,7 @@ const CASES: &[Case] = &[
     (
         "E405",
         &["discretize", "shapes/flat.toml", "--out", "bad.csv"],
-        &["bad.csv exists", "--force", "another --out"],
+        &["bad.csv exists", "--force", "another output"],
     ),
     (
         "E405",
@@ -187,7 +187,7 @@ const CASES: &[Case] = &[
     (
         "E406",
         &["map", SEED, "--out", "bad.csv/maps"],
-        &["bad.csv", "not a folder", "another --out"],
+        &["bad.csv", "not a folder", "another output"],
     ),
     (
         "E406",

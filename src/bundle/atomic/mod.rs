@@ -47,7 +47,7 @@ pub(crate) use temporary::clean_leftovers;
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The target exists and is not known to come from the same inputs.
-    #[error("{path} exists {reason}; use --force to replace it, or choose another --out")]
+    #[error("{path} exists {reason}; use --force to replace it, or choose another output")]
     OutputExists {
         /// The target.
         path: PathBuf,
@@ -69,7 +69,7 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// A folder was to be made where (or below where) a file is.
-    #[error("{path} is not a folder; choose another --out")]
+    #[error("{path} is not a folder; choose another output")]
     NotFolder {
         /// The path that is a file.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// No space left on the device, or the quota is used up.
-    #[error("cannot write {path}: the disk is full; free some space or choose another --out")]
+    #[error("cannot write {path}: the disk is full; free some space or choose another output")]
     DiskFull {
         /// The target.
         path: PathBuf,
