@@ -491,3 +491,28 @@ fn inputs_that_a_bundle_cannot_name_are_refused_before_anything_is_computed() {
         assert!(!place.path("results/seed_air").exists());
     }
 }
+
+/// The first message said to use --force, and with it the second said that nothing replaces the file.
+#[test]
+fn regression_force_was_advised_where_a_link_leads_to_a_file_that_is_not_ours() {
+    let place = Place::new();
+    let link = |to: &str, name: &str| {
+        std::os::unix::fs::symlink(place.path(to), place.path(name)).unwrap();
+    };
+    place.write("thesis.svg", "mine");
+    link("thesis.svg", "link.svg");
+    let ran = place.run(&["evaluate", SEED, "--plot", "link.svg"]);
+    let ran = ran
+        .ends(4)
+        .says(&["E406", "behind a link", "another output"]);
+    assert!(!ran.err.contains("--force"), "{}", ran.err);
+    assert_eq!(place.read("thesis.svg"), b"mine");
+    // A drawing of ours, of another design, is reached with force, and the advice is right.
+    let other = ["evaluate", "designs/seed.toml", "--plot"];
+    place.run(&["evaluate", SEED, "--plot", "ours.svg"]).ends(0);
+    link("ours.svg", "other.svg");
+    let other = [&other[..], &["other.svg"]].concat();
+    place.run(&other).ends(4).says(&["E405", "--force"]);
+    place.run(&[&other[..], &["--force"]].concat()).ends(0);
+    assert!(place.path("other.svg").is_symlink());
+}

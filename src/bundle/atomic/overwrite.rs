@@ -213,12 +213,20 @@ impl Overwrite {
             return Ok(Permit::Same);
         }
         // Force does not reach through a link at the file's name or in place of its folder.
-        if self.force && !linked && !parent_of(shown).is_symlink() {
+        let behind_link = linked || parent_of(shown).is_symlink();
+        if self.force && !behind_link {
             return Ok(Permit::Replace);
         }
-        match self.own(&dir, &real, &status, written.is_some()) {
+        let last = written.is_some();
+        let forced = || Self {
+            force: true,
+            ..self.clone()
+        };
+        match self.own(&dir, &real, &status, last) {
             Ok(()) => Ok(Permit::Replace),
-            Err(_) if self.force => protected(shown, "is behind a link and not known to be ours"),
+            Err(_) if behind_link && forced().own(&dir, &real, &status, last).is_err() => {
+                protected(shown, "is behind a link and not known to be ours")
+            }
             Err(reason) => Err(WriteError::OutputExists {
                 path: shown.to_path_buf(),
                 reason,
