@@ -34,6 +34,24 @@ static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static INTERRUPTIBLE: AtomicUsize = AtomicUsize::new(0);
 /// Computations inside [`to_its_end`].
 static TO_ITS_END: AtomicUsize = AtomicUsize::new(0);
+/// Work inside [`for_a_reader`].
+static FOR_A_READER: AtomicUsize = AtomicUsize::new(0);
+
+/// Counts work while it runs, on unwinding too.
+struct Counted(&'static AtomicUsize);
+
+impl Counted {
+    fn begin(count: &'static AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::SeqCst);
+        Self(count)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
 
 /// The process's request to stop, for who sets it from a signal's handler: true to stop.
 #[must_use]
@@ -79,8 +97,9 @@ pub const fn items_a_task(count: usize) -> usize {
 #[cold]
 fn leave() {
     // A destructor that runs while the thread unwinds must not unwind again.
-    let leaves = INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && !finishing();
-    if leaves && !std::thread::panicking() {
+    let leaves = INTERRUPTIBLE.load(Ordering::SeqCst) > 0;
+    let stays = TO_ITS_END.load(Ordering::SeqCst) > 0;
+    if leaves && !stays && !std::thread::panicking() {
         // No panic: the hook is not called, so nothing is printed.
         resume_unwind(Box::new(Interrupted));
     }
@@ -103,21 +122,31 @@ fn leave() {
 /// assert!(progress::interruptible(progress::poll).is_err());
 /// ```
 pub fn to_its_end<T>(work: impl FnOnce() -> T) -> T {
-    struct Guard;
-    impl Drop for Guard {
-        fn drop(&mut self) {
-            TO_ITS_END.fetch_sub(1, Ordering::SeqCst);
-        }
-    }
-    TO_ITS_END.fetch_add(1, Ordering::SeqCst);
-    let _guard = Guard;
+    let _counted = Counted::begin(&TO_ITS_END);
     work()
 }
 
-/// Whether work is being run [`to_its_end`].
+/// Runs `work`, a part of what runs [`to_its_end`], that somebody else may never let come to its end, such as
+/// the reader of a pipe: [`poll`] does nothing, but the process may be ended meanwhile ([`finishing`]).
+///
+/// ```
+/// use fluxform_base::progress::{finishing, for_a_reader, to_its_end};
+///
+/// to_its_end(|| {
+///     assert!(finishing());
+///     for_a_reader(|| assert!(!finishing()));
+///     assert!(finishing());
+/// });
+/// ```
+pub fn for_a_reader<T>(work: impl FnOnce() -> T) -> T {
+    let _counted = Counted::begin(&FOR_A_READER);
+    work()
+}
+
+/// Whether work is being run [`to_its_end`] and not [`for_a_reader`].
 #[must_use]
 pub fn finishing() -> bool {
-    TO_ITS_END.load(Ordering::SeqCst) > 0
+    TO_ITS_END.load(Ordering::SeqCst) > 0 && FOR_A_READER.load(Ordering::SeqCst) == 0
 }
 
 /// Runs `work` so that [`poll`] can end it.

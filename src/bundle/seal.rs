@@ -35,7 +35,7 @@ pub fn sealed(text: Vec<u8>) -> Vec<u8> {
 
 /// Whether `text` ends with the seal of what is before it.
 #[must_use]
-pub(crate) fn is_sealed(text: &[u8]) -> bool {
+pub fn is_sealed(text: &[u8]) -> bool {
     let length = line(b"").len() + END.len();
     let Some(start) = text.len().checked_sub(length) else {
         return false;

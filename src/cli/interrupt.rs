@@ -2,8 +2,8 @@
 //! second ends the process.
 //!
 //! A job stops by itself within milliseconds wherever it polls. A guard ends the process where a
-//! computation of another crate (a factorisation, a mesher) does not, but never while a file is
-//! being written: what is there is whole.
+//! computation of another crate (a factorisation, a mesher) does not, or where nobody reads what it
+//! puts into a pipe, but never while a file is being written: what is there is whole.
 #![allow(clippy::exit)] // the guard's thread cannot return an exit code
 
 use std::path::PathBuf;
@@ -31,10 +31,12 @@ static ENDED: AtomicBool = AtomicBool::new(false);
 /// Pause between two looks of the guard.
 const LOOK: Duration = Duration::from_millis(10);
 /// Looks after a request to stop until the guard ends the process.
-const PATIENCE: u32 = 10;
+const PATIENCE: i32 = 10;
+/// The same after work that runs to its end: half a second for whoever reads what it gave.
+const PATIENCE_WITH_READERS: i32 = 50;
 /// Said where the guard has to end the process.
-const NO_POLL: &str = "the computation did not stop by itself within a tenth of a second: the process \
-                       was ended";
+const NO_POLL: &str = "the command did not stop by itself, at a computation or at an output that nobody \
+                       reads: the process was ended";
 /// Looks at another run's lock until the wait is reported: one second.
 const SILENT_LOOKS: u32 = 100;
 
@@ -86,8 +88,8 @@ fn guard(common: &Common) {
         }
         // What a stopped job still writes comes first.
         impatience = match finishing() {
-            true => 0,
-            false => impatience + u32::from(stop_requested()),
+            true => PATIENCE - PATIENCE_WITH_READERS,
+            false => impatience + i32::from(stop_requested()),
         };
         if impatience > PATIENCE && !is_writing() {
             if ENDED.swap(true, Ordering::SeqCst) {

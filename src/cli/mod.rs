@@ -13,6 +13,7 @@ pub mod help;
 pub mod interrupt;
 pub mod layout;
 pub mod limits;
+pub mod outlet;
 pub mod pictures;
 pub mod printer;
 pub mod quantity;

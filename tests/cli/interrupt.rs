@@ -548,3 +548,52 @@ fn waiting_for_another_run_is_reported_and_ends_at_a_signal() {
         "{names:?}"
     );
 }
+
+/// Pauses until a command that should have ended is called one that never does: 60 s.
+const LONG: u32 = 3000;
+
+/// The first signal was waited out for ever where a search gave its result to a pipe that nobody reads.
+#[test]
+fn regression_a_search_did_not_end_at_a_signal_while_nobody_read_its_result() {
+    let wound = ["optimize", SEED, "--wound"];
+    let array = ["optimize", SEED, "--for", "shapes/flat.toml"];
+    let quick = ["--vary", "array.pitch_mm=45:55", "--evaluations", "2"];
+    let array = [&array[..], &quick, &["--starts", "1"]].concat();
+    std::thread::scope(|scope| {
+        for search in [&wound[..], &array] {
+            // A pipe that nobody opens, and a page larger than what a pipe holds.
+            for report in ["pipe", "-"] {
+                scope.spawn(move || ends_unread(search, report));
+            }
+        }
+    });
+}
+
+/// `search` ends at a signal while nobody reads its page, and its design is whole.
+fn ends_unread(search: &[&str], report: &str) {
+    let place = Place::new();
+    let made = Command::new("mkfifo").arg(place.path("pipe")).status();
+    assert!(made.unwrap().success());
+    let outputs = ["--out", "best.toml", "--report", report];
+    let mut child = place
+        .command(&[search, &outputs].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !place.path("best.toml").exists() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before it wrote");
+        sleep(Duration::from_millis(5));
+    }
+    terminate(&child);
+    let ended = (0..LONG).any(|_| {
+        sleep(Duration::from_millis(20));
+        child.try_wait().unwrap().is_some()
+    });
+    if !ended {
+        child.kill().unwrap();
+    }
+    let (code, said) = wait(child);
+    assert_eq!(code, Some(130), "{search:?} {report}: {said}");
+    place.run(&["evaluate", "best.toml"]).ends(0);
+}

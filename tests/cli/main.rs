@@ -12,6 +12,7 @@ mod heat;
 mod help;
 mod interrupt;
 mod iron;
+mod journal;
 mod lambda;
 mod messages;
 mod mistakes;

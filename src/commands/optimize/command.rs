@@ -13,12 +13,12 @@ use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
+use crate::cli::outlet::{Outlet, give};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::{accuracy_check, begin, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
-use crate::progress::to_its_end;
 
 /// Find the best coil within a design's limits
 ///
@@ -160,8 +160,16 @@ impl Optimize {
             page,
             plot,
         };
-        // A stop that comes now would lose the coil that was found.
-        to_its_end(|| self.write(&files, &result, printer))?;
+        for warning in &result.warnings {
+            printer.warning(warning);
+        }
+        give(
+            |outlet| self.write(outlet, &files, &result, printer),
+            |place| {
+                let json = printer.with_warnings(&result);
+                printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))
+            },
+        )?;
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }
@@ -207,30 +215,33 @@ impl Optimize {
         )))
     }
 
-    /// Writes every file of the result, and the summary.
+    /// Writes the outputs of the result that go to `outlet`; returns where the summary goes.
     fn write(
         &self,
+        outlet: Outlet,
         files: &Files<'_>,
         result: &Optimization,
         printer: &Printer,
-    ) -> Result<(), Failure> {
-        for warning in &result.warnings {
-            printer.warning(warning);
-        }
-        let mut place = match &result.design_text {
-            Some(text) => write_to(self.out.as_ref(), files.overwrite, printer, |out| {
+    ) -> Result<Stream, Failure> {
+        let mut place = Stream::Output;
+        if outlet.takes(self.out.as_ref())
+            && let Some(text) = &result.design_text
+        {
+            place = write_to(self.out.as_ref(), files.overwrite, printer, |out| {
                 write!(out, "{}\n{text}", files.mark)
-            })?,
-            None => Stream::Output,
-        };
-        if let Some(page) = &files.page {
+            })?;
+        }
+        if outlet.takes(self.report.as_ref())
+            && let Some(page) = &files.page
+        {
             place = place.or(page.write(&result.inputs, &page::html(result), printer)?);
         }
-        if let (Some(plot), Some(picture)) = (&files.plot, &result.picture) {
+        if outlet.takes(self.array.plot.as_ref())
+            && let (Some(plot), Some(picture)) = (&files.plot, &result.picture)
+        {
             place = place.or(plot.draw(&result.inputs, &picture.drawing(), printer)?);
         }
-        let json = printer.with_warnings(result);
-        printer.summary(place, &json, || text::summary(result, self.out.as_ref()))
+        Ok(place)
     }
 
     fn request(&self) -> OptimizeRequest {

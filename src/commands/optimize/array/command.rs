@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::physics::{Aim, ArrayPhysics, Constant, Journal, OtherAim};
 use super::{
-    ArrayEnding, ArrayOptimization, ArrayRequest, optimize_array, page, settling_in_array, tables,
-    text,
+    ArrayEnding, ArrayOptimization, ArrayRequest, journal, optimize_array, page, settling_in_array,
+    tables, text,
 };
 use crate::RunError;
 use crate::bundle::artefact::{Input, sha256_hex};
@@ -16,6 +16,7 @@ use crate::cli::args::SurfaceFlags;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::EVALUATIONS;
+use crate::cli::outlet::{Outlet, give};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::{begin, write_to};
@@ -26,11 +27,12 @@ use crate::coil::array_search::space::{Space, choices};
 use crate::coil::array_search::study::Effort;
 use crate::commands::optimize::Document;
 use crate::commands::sweep::axis;
+use crate::design::message_text::shown_path;
 use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::lambda::Criterion;
 use crate::numerics::mixed_search::Settings;
-use crate::progress::{Interrupted, Progress, to_its_end};
+use crate::progress::{Interrupted, Progress};
 use crate::scene::cost;
 
 /// An array for shapes instead of a coil.
@@ -74,6 +76,8 @@ pub struct ArrayFlags {
     #[arg(long, hide_short_help = true, value_name = "FILE", value_parser = values::picture)]
     pub plot: Option<FileArgument>,
     /// Keep every array that is computed in this file, and take from it those of an earlier run
+    ///
+    /// Runs of one design may share it, side by side too. A file that is damaged or was changed by hand is refused.
     #[arg(long, hide_short_help = true, value_name = "FILE", requires = "shapes")]
     pub journal: Option<FileArgument>,
     #[command(flatten)]
@@ -133,8 +137,7 @@ impl ArrayFlags {
         let outputs = self.outputs(shared, &document, &inputs)?;
         let bar = begin(printer);
         let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
-        let earlier = self.read_journal(&physics)?;
-        let of_journal = outputs.marked.clone().taking_up(earlier.as_bytes());
+        physics.remember(self.earlier()?);
         let request = self.request(shared, shapes.len())?;
         printer.notice(&estimate(&design, &physics, &request));
         let source = Document {
@@ -143,24 +146,11 @@ impl ArrayFlags {
             path,
         };
         let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
-        let journal = physics.journal();
+        let arrays = physics.journal();
         let seconds = bar.take_seconds();
         drop(physics);
         drop(bar);
-        // Writing polls, and would give up after a stop what the search still answered.
-        let status = to_its_end(|| -> Result<_, Failure> {
-            self.write_journal(&journal, &outputs.mark, &of_journal, printer)?;
-            let result = ended?;
-            for warning in &result.warnings {
-                printer.warning(warning);
-            }
-            let place = self.write(shared, &outputs, &result, printer)?;
-            let json = printer.with_warnings(&result);
-            printer.summary(place, &json, || {
-                text::summary(&result, shared.out, &seconds)
-            })?;
-            Ok(result.status)
-        })?;
+        let status = self.give(shared, &outputs, ended, &arrays, &seconds, printer)?;
         match status {
             ArrayEnding::Done => Ok(()),
             ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
@@ -169,6 +159,84 @@ impl ArrayFlags {
                 "no array that was computed meets every limit; the result is the one that breaks them least".to_owned(),
             )),
         }
+    }
+
+    /// The arrays of earlier runs.
+    fn earlier(&self) -> Result<Journal, Failure> {
+        let Some(FileArgument::Path(path)) = &self.journal else {
+            return Ok(Journal::new());
+        };
+        let kept = journal::read(path);
+        let kept =
+            kept.map_err(|wrong| Failure::Input(format!("{}: {wrong}", shown_path(path))))?;
+        Ok(kept.arrays)
+    }
+
+    /// Writes the journal; returns where the summary goes.
+    fn keep(
+        &self,
+        outputs: &Outputs<'_>,
+        arrays: &Journal,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
+        match &self.journal {
+            Some(FileArgument::Path(path)) => {
+                journal::add(path, &outputs.mark, &outputs.marked, arrays)
+                    .map_err(RunError::from)?;
+                Ok(Stream::Output)
+            }
+            file => {
+                let text = journal::text(&outputs.mark, arrays)?;
+                write_to(file.as_ref(), &outputs.marked, printer, |out| {
+                    out.write_all(&text)
+                })
+            }
+        }
+    }
+
+    /// Gives the result, and the journal also where there is none. A journal that cannot be written costs no
+    /// result: it is reported in the end.
+    fn give(
+        &self,
+        shared: &Shared<'_>,
+        outputs: &Outputs<'_>,
+        ended: Result<ArrayOptimization, RunError>,
+        arrays: &Journal,
+        seconds: &[(String, f64)],
+        printer: &Printer,
+    ) -> Result<ArrayEnding, Failure> {
+        for warning in ended.iter().flat_map(|result| &result.warnings) {
+            printer.warning(warning);
+        }
+        let mut kept = Ok(Stream::Output);
+        let given = give(
+            |outlet| {
+                if outlet.takes(self.journal.as_ref()) {
+                    kept = self.keep(outputs, arrays, printer);
+                }
+                let place = *kept.as_ref().unwrap_or(&Stream::Output);
+                match &ended {
+                    Ok(result) => {
+                        let written = self.write(outlet, shared, outputs, result, printer)?;
+                        Ok(place.or(written))
+                    }
+                    Err(_) => Ok(place),
+                }
+            },
+            |place| match &ended {
+                Ok(result) => {
+                    let json = printer.with_warnings(result);
+                    printer.summary(place, &json, || text::summary(result, shared.out, seconds))
+                }
+                Err(_) => Ok(()),
+            },
+        );
+        if let (Err(failure), true) = (&kept, given.is_err() || ended.is_err()) {
+            printer.warning(&failure.message());
+        }
+        given?;
+        let result = ended?;
+        kept.map(|_| result.status)
     }
 
     /// Every file that will be written, checked before the search.
@@ -224,32 +292,41 @@ impl ArrayFlags {
         })
     }
 
-    /// Writes every file of the result; returns where the summary goes.
+    /// Writes the outputs of the result that go to `outlet`; returns where the summary goes.
     fn write(
         &self,
+        outlet: Outlet,
         shared: &Shared<'_>,
         outputs: &Outputs<'_>,
         result: &ArrayOptimization,
         printer: &Printer,
     ) -> Result<Stream, Failure> {
-        let design = format!("{}\n{}", outputs.mark, result.design_text);
-        let place = write_to(shared.out, &outputs.marked, printer, |out| {
-            out.write_all(design.as_bytes())
-        })?;
-        let table = tables::csv(result);
-        let front = write_to(self.front.as_ref(), &outputs.of_table, printer, |out| {
-            out.write_all(table.as_bytes())
-        })?;
+        let mut place = Stream::Output;
+        if outlet.takes(shared.out) {
+            let design = format!("{}\n{}", outputs.mark, result.design_text);
+            place = write_to(shared.out, &outputs.marked, printer, |out| {
+                out.write_all(design.as_bytes())
+            })?;
+        }
+        if outlet.takes(self.front.as_ref()) {
+            let table = tables::csv(result);
+            let file = self.front.as_ref();
+            place = place.or(write_to(file, &outputs.of_table, printer, |out| {
+                out.write_all(table.as_bytes())
+            })?);
+        }
         let worths = result.study.as_ref().map_or_else(Vec::new, text::worths);
-        let drawn = match (&outputs.plot, tables::pareto(result, &worths)) {
-            (Some(plot), Some(pareto)) => plot.draw(&result.inputs, &pareto.drawing(), printer)?,
-            _ => Stream::Output,
-        };
-        let paged = match &outputs.report {
-            Some(report) => report.write(&result.inputs, &page::html(result), printer)?,
-            None => Stream::Output,
-        };
-        Ok(place.or(front).or(drawn).or(paged))
+        if outlet.takes(self.plot.as_ref())
+            && let (Some(plot), Some(pareto)) = (&outputs.plot, tables::pareto(result, &worths))
+        {
+            place = place.or(plot.draw(&result.inputs, &pareto.drawing(), printer)?);
+        }
+        if outlet.takes(shared.report)
+            && let Some(report) = &outputs.report
+        {
+            place = place.or(report.write(&result.inputs, &page::html(result), printer)?);
+        }
+        Ok(place)
     }
 
     /// The design's text with what the flags vary.
@@ -321,43 +398,6 @@ impl ArrayFlags {
             tolerance: shared.tolerance,
             every_count: self.front.is_some(),
         })
-    }
-
-    /// The text of an earlier run's journal, whose arrays the physics know from now on; empty without one.
-    fn read_journal(&self, physics: &ArrayPhysics) -> Result<String, Failure> {
-        let Some(FileArgument::Path(path)) = &self.journal else {
-            return Ok(String::new());
-        };
-        if !path.exists() {
-            return Ok(String::new());
-        }
-        let text = crate::design::source::text_of(path)
-            .map_err(|fault| Failure::Documents(vec![fault]))?;
-        let lines: String = text.lines().filter(|line| !line.starts_with('#')).collect();
-        let journal = serde_json::from_str(&lines).map_err(|wrong| {
-            Failure::Input(format!(
-                "{}: not a journal of `optimize --for`: {wrong}",
-                path.display()
-            ))
-        })?;
-        physics.remember(journal);
-        Ok(text)
-    }
-
-    fn write_journal(
-        &self,
-        journal: &Journal,
-        mark: &str,
-        overwrite: &Overwrite,
-        printer: &Printer,
-    ) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(journal);
-        let text = text.map_err(|error| Failure::Input(error.to_string()))?;
-        let file = self.journal.as_ref();
-        write_to(file, overwrite, printer, |out| {
-            write!(out, "{mark}\n{text}\n")
-        })
-        .map(|_| ())
     }
 }
 

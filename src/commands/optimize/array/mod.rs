@@ -1,6 +1,7 @@
 //! `optimize --for`: the array that renders given shapes best.
 
 pub(crate) mod command;
+mod journal;
 mod page;
 pub mod physics;
 mod pitch_bound;

@@ -121,7 +121,7 @@ const LEAST_ERROR: f64 = 1e-6;
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
 
-/// Computed properties, by a digest of the design.
+/// Computed properties, by a digest of all that they were computed from.
 pub type Journal = BTreeMap<String, Option<Physical>>;
 
 /// Samples of a shape along one axis while searching.
