@@ -17,29 +17,3 @@ pub const LOG_RULE: [[f64; 2]; 12] = [
     [0.9098838287655626, 0.09819669547418951],
     [0.9823479377157619, 0.04496525739359079],
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn is_exact_for_its_system() {
-        for k in 0..12 {
-            let (mut plain, mut log) = (0.0, 0.0);
-            for [t, weight] in LOG_RULE {
-                plain += weight * t.powi(k);
-                log += weight * t.powi(k) * t.ln();
-            }
-            let exact = 1.0 / (f64::from(k) + 1.0);
-            assert!((plain - exact).abs() < 1e-15, "{k}: {plain}");
-            assert!((log + exact * exact).abs() < 1e-15, "{k}: {log}");
-        }
-    }
-
-    #[test]
-    fn integrates_a_smooth_function_times_a_logarithm() {
-        // int_0^1 cos(t) ln t dt = -Si(1).
-        let sum: f64 = LOG_RULE.iter().map(|[t, w]| w * t.cos() * t.ln()).sum();
-        assert!((sum + 0.946_083_070_367_183).abs() < 1e-15, "{sum}");
-    }
-}

@@ -127,33 +127,3 @@ fn exchange(part: &mut DMatrixViewMut<'_, f64>, first: usize, rows: &[usize]) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::Random;
-
-    /// Sizes within, on and beyond a block's end; small leading entries ask for exchanged rows.
-    #[test]
-    fn the_solution_gives_the_right_hand_sides_back() {
-        for size in [1, 7, BLOCK, BLOCK + 1, 3 * BLOCK + PORTION + 5] {
-            let mut random = Random::new(17);
-            let mut matrix = DMatrix::from_fn(size, size, |_, _| random.between(-0.5, 0.5));
-            for k in 0..size {
-                matrix[(k, k)] *= 1e-9;
-            }
-            let expected = DMatrix::from_fn(size, 3, |_, _| random.between(-0.3, 0.7));
-            let mut found = &matrix * &expected;
-            Factored::new(matrix).unwrap().solve(&mut found);
-            let error = (&found - &expected).amax();
-            assert!(error < 1e-9, "{size}: {error:e}");
-        }
-    }
-
-    #[test]
-    fn a_singular_matrix_has_no_factors() {
-        let mut matrix = DMatrix::from_fn(5, 5, |i, j| 0.7 + (3 * i + 2 * j) as f64 % 4.3);
-        matrix.column_mut(3).fill(0.0);
-        assert!(Factored::new(matrix).is_none());
-    }
-}

@@ -11,8 +11,6 @@ pub mod descent;
 mod rounding;
 mod search;
 pub mod surrogate;
-#[cfg(test)]
-mod tests;
 mod variable;
 
 pub use search::{MET, Problem, Sample, Search, Settings};

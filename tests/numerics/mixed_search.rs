@@ -1,8 +1,8 @@
 //! The search on problems whose optimum is known.
 
-use super::descent::Judged;
-use super::*;
 use fluxform_base::progress::Interrupted;
+use fluxform_numerics::mixed_search::descent::Judged;
+use fluxform_numerics::mixed_search::{MET, Problem, Search, Settings, Values, Variable};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A problem from closures.
