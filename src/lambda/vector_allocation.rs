@@ -607,9 +607,9 @@ impl EvenAxes {
             }
         }
         // An axis along which no coil gives anything stays as it is.
-        for k in 0..3 {
-            if product[k][k] == 0.0 {
-                product[k][k] = 1.0;
+        for (k, row) in product.iter_mut().enumerate() {
+            if row[k] == 0.0 {
+                row[k] = 1.0;
             }
         }
         Factor::new(&product, 3, PIVOT).map(Self)
@@ -678,8 +678,8 @@ impl Factor {
             let known: f64 = (a + 1..n).map(|k| self.l[k][a] * x[k]).sum();
             x[a] = (x[a] - known) / self.l[a][a];
         }
-        for a in 0..n {
-            x[a] /= self.scale[a];
+        for (part, scale) in x.iter_mut().zip(&self.scale).take(n) {
+            *part /= scale;
         }
         x
     }
