@@ -15,6 +15,8 @@
 //! from where it is measured (m), mean square and mean of its strength over the stated one, mean square of a
 //! driver's relative error.
 
+use std::borrow::Cow;
+
 use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
 use super::table::PointRow;
@@ -62,34 +64,48 @@ pub struct Requested {
 }
 
 impl Rendering {
+    /// Every array by its name in `map.npz`, with how many numbers it must hold for an array of `coils`; empty where
+    /// there is none.
+    #[must_use]
+    pub fn arrays(&self, coils: usize) -> [(&'static str, Cow<'_, [f64]>, usize); 10] {
+        let heights = &self.heights;
+        let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
+        let nodes = nx.saturating_mul(ny);
+        let requested = self.requested.as_ref();
+        let direction = requested.map_or(&[][..], |requested| &requested.direction);
+        let of_direction = requested.map_or(0, |_| nodes.saturating_mul(3));
+        let weight: Vec<f64> = requested.map(|it| it.sideways_weight).into_iter().collect();
+        let robust = self.robust.as_ref().map(robust_numbers);
+        let robust: Vec<f64> = robust.into_iter().flatten().collect();
+        let (of_weight, of_robust) = (weight.len(), robust.len());
+        let voltage = self.voltage_v.as_slice();
+        [
+            (HEIGHT_X, heights.x_m[..].into(), nx),
+            (HEIGHT_Y, heights.y_m[..].into(), ny),
+            (HEIGHT, heights.height_m[..].into(), nodes),
+            (HAS_HEIGHT, heights.has_height[..].into(), nodes),
+            (STATIC_CURRENT, self.static_current_a[..].into(), coils),
+            (
+                INDUCTANCE,
+                self.inductance_h[..].into(),
+                coils.saturating_mul(coils),
+            ),
+            (VOLTAGE, voltage.into(), voltage.len()),
+            (DIRECTION, direction.into(), of_direction),
+            (SIDEWAYS_WEIGHT, weight.into(), of_weight),
+            (ROBUST, robust.into(), of_robust),
+        ]
+    }
+
     /// Lengths, finite numbers and order, for an array of `coils`.
     pub(super) fn validate(&self, coils: usize) -> Result<(), NpzError> {
         let heights = &self.heights;
-        let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
         for (name, nodes) in [(HEIGHT_X, &heights.x_m), (HEIGHT_Y, &heights.y_m)] {
             if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
                 return Err(bad(name, "must increase from node to node"));
             }
         }
-        let voltage = self.voltage_v.as_slice();
-        let requested = self.requested.as_ref();
-        let direction = requested.map_or(&[][..], |requested| &requested.direction);
-        let weight = requested.map(|requested| requested.sideways_weight);
-        let robust = self.robust.as_ref().map(robust_numbers);
-        let robust = robust.as_ref().map_or(&[][..], |numbers| numbers);
-        let of_direction = requested.map_or(0, |_| nx.saturating_mul(ny).saturating_mul(3));
-        for (name, values, count) in [
-            (HEIGHT_X, &heights.x_m[..], nx),
-            (HEIGHT_Y, &heights.y_m, ny),
-            (HEIGHT, &heights.height_m, nx.saturating_mul(ny)),
-            (HAS_HEIGHT, &heights.has_height, nx.saturating_mul(ny)),
-            (STATIC_CURRENT, &self.static_current_a, coils),
-            (INDUCTANCE, &self.inductance_h, coils.saturating_mul(coils)),
-            (VOLTAGE, voltage, voltage.len()),
-            (DIRECTION, direction, of_direction),
-            (SIDEWAYS_WEIGHT, weight.as_slice(), weight.iter().len()),
-            (ROBUST, robust, robust.len()),
-        ] {
+        for (name, values, count) in self.arrays(coils) {
             if values.len() != count {
                 let message = format!("must hold {count} numbers, holds {}", values.len());
                 return Err(bad(name, message));
@@ -97,7 +113,7 @@ impl Rendering {
             if !values.iter().all(|value| value.is_finite()) {
                 return Err(bad(name, "holds a number that is not finite"));
             }
-            if !all_within(values, LARGEST) {
+            if !all_within(&values, LARGEST) {
                 return Err(bad(name, BEYOND));
             }
         }
@@ -110,10 +126,12 @@ impl Rendering {
         {
             return Err(bad(HAS_HEIGHT, "must hold 0 or 1"));
         }
+        let weight = self.requested.as_ref().map(|it| it.sideways_weight);
         if weight.is_some_and(|weight| !(LEAST_WEIGHT..=1.0).contains(&weight)) {
             return Err(bad(SIDEWAYS_WEIGHT, "must lie between 1e-6 and 1"));
         }
-        if robust.iter().any(|number| *number < 0.0) || robust.first() == Some(&0.0) {
+        let robust = self.robust.as_ref().map(robust_numbers);
+        if robust.is_some_and(|numbers| numbers[0] == 0.0 || numbers.iter().any(|it| *it < 0.0)) {
             return Err(bad(ROBUST, "must hold a price above 0 and nothing below 0"));
         }
         Ok(())

@@ -188,7 +188,7 @@ use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [every_forgery_with_fitting_checksums_is_noticed, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
+        None => [every_forgery_with_fitting_checksums_is_noticed, regression_what_steers_a_vector_was_believed_of_another_platform, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
     }
 }
 
@@ -535,6 +535,40 @@ fn every_forgery_with_fitting_checksums_is_noticed() {
     );
     assert!(FORGERIES.len() >= 42);
     assert_eq!(missed, []);
+}
+
+/// A force that pulled instead of pushing passed where the bundle named another platform.
+fn regression_what_steers_a_vector_was_believed_of_another_platform() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = format!("{DESIGN}[uncertainty]\nsensor_mm = 0.3\n");
+    let shape = SHAPE.replace("[points]", "force = \"vertical-only\"\n[points]");
+    let mut honest = Parts::of(&calibrated(folder.path(), &design, &shape, false));
+    honest.options().arithmetic = "pdp-11 unix, baseline".to_owned();
+    let mut verifier = Verifier::default();
+    let forgeries: [(&str, bool, fn(&mut Parts)); 4] = [
+        ("nothing", true, |_| {}),
+        ("a direction", false, |p| {
+            let requested = p.rendering().requested.as_mut().unwrap();
+            requested
+                .direction
+                .iter_mut()
+                .for_each(|part| *part = -*part);
+        }),
+        ("the price of power", false, |p| {
+            p.rendering().robust.as_mut().unwrap().price_n2_per_w *= 1e3;
+        }),
+        ("where there is a surface", false, |p| {
+            let has = &mut p.rendering().heights.has_height;
+            has[0] = 1.0 - has[0];
+        }),
+    ];
+    for (name, expected, forge) in forgeries {
+        let mut parts = honest.clone();
+        forge(&mut parts);
+        let target = folder.path().join(name.replace(' ', "-"));
+        parts.write(&target);
+        assert_eq!(passes(&mut verifier, &target).0, expected, "{name}");
+    }
 }
 
 /// A bundle as programs before schema 1.4 wrote it: without the run's options, in other words, and with

@@ -112,7 +112,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let mut faults = Vec::new();
     let tolerance = tolerance(expected);
     let mut unchecked = vec![format!(
-        "the last bits of numbers: made by fluxform {} on {}; verify there",
+        "the last bits of numbers, and the map's values at nodes that were not computed again: made by fluxform {} on {}; verify there",
         bundle.manifest.fluxform_version,
         made_on(bundle)
     )];
@@ -146,6 +146,14 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         unchecked.push(format!(
             "entries that another program words or has otherwise: {named}"
         ));
+    }
+    let coils = bundle.map.runtime.resistance_ohm.len();
+    if let [Some(stored), Some(again)] = [&bundle.map.runtime.rendering, &expected.rendering] {
+        for ((name, a, _), (_, b, _)) in stored.arrays(coils).into_iter().zip(again.arrays(coils)) {
+            if !same_array(&a, &b, tolerance) {
+                faults.push(format!("map.npz {name}"));
+            }
+        }
     }
     if !same_points(&bundle.points, &expected.points) {
         faults.push("points.csv".to_owned());
@@ -259,6 +267,13 @@ fn kept_and_pages(
             pages.join(", ")
         ));
     }
+}
+
+/// Whether no number differs by more than `tolerance` times the largest.
+fn same_array(stored: &[f64], again: &[f64], tolerance: f64) -> bool {
+    let largest = again.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
+    let mut pairs = stored.iter().zip(again);
+    stored.len() == again.len() && pairs.all(|(a, b)| (a - b).abs() <= tolerance * largest)
 }
 
 fn same_points(stored: &[PointRow], again: &[PointRow]) -> bool {
