@@ -42,7 +42,7 @@ pub enum ShapeError {
     },
     /// The file states another unit than the user.
     #[error(
-        "{}: the file itself is in {file}, but `unit` says {stated}; leave the unit out, or \
+        "{}: the file is in {file}, as it says or its format has it, but `unit` says {stated}; leave the unit out, or \
          correct the export",
         path.display()
     )]

@@ -192,7 +192,8 @@ pub fn trials() -> Vec<Trial> {
     }
 }
 
-type Forgery = (&'static str, Elsewhere, fn(&mut Parts));
+type Change = fn(&mut Parts);
+type Forgery = (&'static str, Elsewhere, Change);
 
 const FORGERIES: &[Forgery] = &[
     (
@@ -545,7 +546,7 @@ fn regression_what_steers_a_vector_was_believed_of_another_platform() {
     let mut honest = Parts::of(&calibrated(folder.path(), &design, &shape, false));
     honest.options().arithmetic = "pdp-11 unix, baseline".to_owned();
     let mut verifier = Verifier::default();
-    let forgeries: [(&str, bool, fn(&mut Parts)); 4] = [
+    let forgeries: [(&str, bool, Change); 4] = [
         ("nothing", true, |_| {}),
         ("a direction", false, |p| {
             let requested = p.rendering().requested.as_mut().unwrap();

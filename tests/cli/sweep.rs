@@ -325,6 +325,9 @@ fn a_partial_merge_leaves_a_fuller_table_alone() {
         .ends(4)
         .says(&["fuller", "misses 182", "234 are missing", "--force"]);
     assert!(place.read("sweep.csv") == fuller);
+    // A folder that was mistyped was passed over.
+    let run = merge("mroe");
+    place.run(&run).ends(4).says(&["mroe: no such folder"]);
     place
         .run(&[&merge("some")[..], &["--force"]].concat())
         .ends(0);

@@ -281,6 +281,13 @@ fn another_unit_is_warned_of_with_its_factor() {
         BhWarning::UnitOfB { unit, times, .. } => Some((*unit, *times)),
         _ => None,
     };
+    // Linear steel would be vacuum in kA/m, which was advised.
+    let (linear_b, linear_h) = ([0.0, 0.5, 1.0, 2.0], [0.0, 400.0, 800.0, 1600.0]);
+    let linear = BhCurve::new(&linear_b, &linear_h).unwrap().warnings();
+    assert!(
+        matches!(linear[..], [BhWarning::EndsEarly { .. }]),
+        "{linear:?}"
+    );
     let oersted = 1000.0 / (4.0 * std::f64::consts::PI);
     let one = said(1.0, 1e-3);
     assert_eq!(

@@ -81,7 +81,7 @@ fn the_files_unit_is_used_and_another_is_refused() {
     assert_eq!(with_unit(None).unwrap(), given);
     let said = with_unit(Some(1e-3)).unwrap_err().to_string();
     assert!(
-        said.contains("the file itself is in in, but `unit` says mm"),
+        said.contains("the file is in in, as it says or its format has it, but `unit` says mm"),
         "{said}"
     );
 }

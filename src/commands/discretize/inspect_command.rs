@@ -199,7 +199,10 @@ fn lies(placed: &Placed) -> String {
 /// The unit, as far as it is known.
 fn unit(found: &MeshReport) -> String {
     if let Some(unit_m) = found.unit_m {
-        return format!("{}, as the file says", unit_name(unit_m));
+        return format!(
+            "{}, as the file says or its format has it",
+            unit_name(unit_m)
+        );
     }
     let guesses: Vec<String> = found
         .unit_guesses

@@ -17,6 +17,7 @@ use crate::bundle::sweep::{
     ArrayMerit, ArrayRow, MergeSummary, Mode, PlanFile, PointFile, PointStore, StoredPoint,
     TableWriter, columns, value_text,
 };
+use crate::design::message_text::shown_path;
 use crate::design::template::Template;
 use crate::numerics::front::front;
 use crate::plot::landscape::Landscape;
@@ -341,6 +342,10 @@ fn gather(
     out: &mut dyn Write,
     progress: &dyn Progress,
 ) -> Result<Gathered, Stop> {
+    if let Some(absent) = request.folders.iter().find(|folder| !folder.is_dir()) {
+        let message = format!("{}: no such folder of `sweep run`", shown_path(absent));
+        return Err(Stop::Job(RunError::Sweep(message)));
+    }
     let mut gathered = Gathered::default();
     let keys = plan.axes.iter().map(|axis| axis.key.as_str());
     let variables = variables(plan, request).map_err(Stop::Job)?;

@@ -19,7 +19,7 @@ use crate::scene::sources::ShapeSource;
 use crate::shape::document::ShapeDocument;
 
 /// Values at fault that are reported one by one.
-const TOLD: usize = 20;
+const LISTED: usize = 20;
 /// The key of a B-H table.
 const CURVE_KEY: &str = "core.bh_curve";
 
@@ -73,7 +73,7 @@ impl PlanRequest {
 /// when it is computed.
 ///
 /// # Errors
-/// Values that the design's keys do not take; files that it names that cannot be read; a search of arrays in which
+/// Values that the design's keys do not take; sizes of a winding that each design finds for itself; files that it names that cannot be read; a search of arrays in which
 /// nothing varies.
 pub fn plan(
     design: &Design,
@@ -89,6 +89,15 @@ pub fn plan(
         .any(|axis| axis.key.starts_with("search"));
     if request.array.is_some() && !searched && design.search == SearchSpace::default() {
         return Err(RunError::Input(NOTHING_SEARCHED.to_owned()));
+    }
+    let finds_winding = matches!(request.mode, Mode::Optimize | Mode::OptimizeWound);
+    let idle = request.axes.iter().find(|it| it.key.starts_with("coil."));
+    if let (true, Some(axis)) = (finds_winding, idle) {
+        return Err(RunError::Input(format!(
+            "{}: every design of such a sweep has the best winding, whatever the given one is; vary limits, wire, core \
+             or magnet, or leave out --optimize",
+            axis.key
+        )));
     }
     let mut inputs = vec![input];
     for file in named_files(design, &path, &request.axes) {
@@ -172,8 +181,8 @@ fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> 
     if faults.is_empty() {
         return Ok(());
     }
-    let more = faults.len().saturating_sub(TOLD);
-    faults.truncate(TOLD);
+    let more = faults.len().saturating_sub(LISTED);
+    faults.truncate(LISTED);
     if more > 0 {
         faults.push(format!("and {more} more values"));
     }
@@ -227,13 +236,17 @@ mod tests {
                           outer_diameter_mm = 38.0\nlength_mm = 70.0\n[wire]\ndiameter_mm = 0.7\n";
 
     fn planned(settings: &[&str]) -> Result<PlanFile, String> {
-        planned_for(None, settings)
+        planned_for(Mode::Evaluate, None, settings)
     }
 
-    fn planned_for(array: Option<ArrayTask>, settings: &[&str]) -> Result<PlanFile, String> {
+    fn planned_for(
+        mode: Mode,
+        array: Option<ArrayTask>,
+        settings: &[&str],
+    ) -> Result<PlanFile, String> {
         let request = PlanRequest {
             axes: settings.iter().map(|s| axis::parse(s).unwrap()).collect(),
-            mode: Mode::Evaluate,
+            mode,
             seed: 0,
             tolerance: None,
             array,
@@ -275,16 +288,35 @@ mod tests {
         assert_eq!(plan.unwrap().points, 5 * 14);
     }
 
+    /// Every design had the same best winding, under names of sizes that it had not.
+    #[test]
+    fn regression_a_winding_that_is_searched_was_an_axis() {
+        for mode in [Mode::Optimize, Mode::OptimizeWound] {
+            let said = planned_for(
+                mode,
+                None,
+                &["wire.diameter_mm=0.5,0.7", "coil.turns=700,1400"],
+            );
+            assert!(said.unwrap_err().starts_with("coil.turns: "));
+            assert!(planned_for(mode, None, &["wire.diameter_mm=0.5,0.7"]).is_ok());
+        }
+    }
+
     #[test]
     fn an_array_in_which_nothing_varies_is_not_planned() {
         let task = ArrayTask {
             shapes: Vec::new(),
             evaluations: 10,
         };
-        let said = planned_for(Some(task.clone()), &["coil.turns=700,1300"]).unwrap_err();
+        let said = planned_for(
+            Mode::OptimizeFor,
+            Some(task.clone()),
+            &["coil.turns=700,1300"],
+        )
+        .unwrap_err();
         assert_eq!(said, NOTHING_SEARCHED);
         let varied = "search.array.pitch_mm=[40,60],[40,50]";
-        assert!(planned_for(Some(task), &[varied]).is_ok());
+        assert!(planned_for(Mode::OptimizeFor, Some(task), &[varied]).is_ok());
     }
 
     #[test]

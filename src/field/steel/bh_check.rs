@@ -23,6 +23,8 @@ const GAUSS_BELOW: f64 = 1e5;
 const SATURATED: [(f64, f64); 2] = [(1.5, 300.0), (1.9, 30.0)];
 /// Differential relative permeability under which a table's end counts as saturated.
 const VACUUM_FOLLOWS: f64 = 10.0;
+/// Steel is somewhere more permeable than this.
+const LEAST_PERMEABILITY: f64 = 30.0;
 /// A/m in an oersted.
 const A_PER_M_IN_OERSTED: f64 = 79.577_471_545_947_67;
 
@@ -357,6 +359,10 @@ fn unit_of_h(last_slope: f64, b: &[f64], h: &[f64], times: f64, found: &mut Vec<
     } else {
         ("oersted", A_PER_M_IN_OERSTED)
     };
+    // Steel that is hardly any in another unit is linear in this one.
+    if relative_permeability < LEAST_PERMEABILITY * times {
+        return;
+    }
     found.push(BhWarning::UnitOfH {
         relative_permeability,
         last_relative_permeability,

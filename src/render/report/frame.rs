@@ -99,7 +99,7 @@ impl Page {
             Value::Object(data) if data.is_empty() => "",
             _ => {
                 "<noscript><p class=\"note\">The drawings need JavaScript; every number stands in \
-                 the tables, and the drawings as SVG in the folder plots.</p></noscript>\n"
+                 the tables.</p></noscript>\n"
             }
         };
         html.raw("</main>\n<footer>")
