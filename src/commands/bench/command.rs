@@ -150,6 +150,9 @@ fn summary(file: &BenchFile, folder: &str) -> String {
         of_shape(&mut sheet, shape);
         sheet.gap();
     }
+    let note = "measured against the refined run; `calibrate` has none and states bounds, which at loose tolerances are \
+                many times larger";
+    sheet.line("errors", note);
     for left_out in &file.left_out {
         sheet.line("not swept", &format!("{}: {}", left_out.knob, left_out.why));
     }

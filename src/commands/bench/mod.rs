@@ -167,7 +167,7 @@ fn measure(
                    interpolated map against what they give directly in the refined field, relative \
                    to the force to be felt there, and what that field may be off by; the largest of places of \
                    the surface all over the maps' cells and up to its rim, times 1.25 for what lies between \
-                   them"
+                   them. `calibrate` has no refined run: it states bounds, which at loose tolerances are many times larger"
             .to_owned(),
         timed: "processor time of all threads: steel, points, forces with all force constants, and \
                 the part of the map that the object needs; the median where short enough to repeat"
