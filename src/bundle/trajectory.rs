@@ -10,7 +10,7 @@ pub(crate) const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
 /// Columns of a second finger.
 const SECOND_COLUMNS: [&str; 3] = ["x2_m", "y2_m", "z2_m"];
 
-/// Beyond this size of a time, s, or position, m, sums over rows are no numbers.
+/// Beyond this size of a time, s, or position, m, sums over rows are not finite.
 const MOST: f64 = 1e30;
 
 /// Positions of the magnet's centre over time, of one finger or two; times never decrease.

@@ -125,7 +125,7 @@ pub enum NoRule {
     #[error("the magnet's size, its distance and the tolerance must be positive numbers")]
     NotANumber,
     /// The magnet touches a source or overlaps it.
-    #[error("the magnet touches a field source or overlaps it: it may be {:.3} mm below its top", gap_m.abs() * 1e3)]
+    #[error("the magnet touches a field source or overlaps it, by up to {:.3} mm", gap_m.abs() * 1e3)]
     Touches {
         /// Gap between magnet and source, m.
         gap_m: f64,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{BenchRequest, Estimate, run};
+use super::{BenchRequest, Estimate, MEASURED, run};
 use crate::bundle::bench::{BenchFile, Cheapest, ShapeBench};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
@@ -150,9 +150,7 @@ fn summary(file: &BenchFile, folder: &str) -> String {
         of_shape(&mut sheet, shape);
         sheet.gap();
     }
-    let note = "measured against the refined run; `calibrate` has none and states bounds, which at loose tolerances are \
-                many times larger";
-    sheet.line("errors", note);
+    sheet.line("errors", MEASURED);
     for left_out in &file.left_out {
         sheet.line("not swept", &format!("{}: {}", left_out.knob, left_out.why));
     }

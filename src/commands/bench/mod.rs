@@ -38,6 +38,10 @@ use crate::scene::sources::ShapeSource;
 /// The errors for which the cheapest settings are named.
 pub const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
 
+/// How these errors and those that `calibrate` states differ.
+const MEASURED: &str = "measured against the refined run; `calibrate` has none and states bounds, which are larger, most of \
+                        all at loose tolerances";
+
 /// Measurement, method and destination.
 #[derive(Debug, Clone)]
 pub struct BenchRequest<'a> {
@@ -163,15 +167,17 @@ fn measure(
         units: UNITS.to_owned(),
         criterion: request.lambda.settings.criterion,
         quick: request.quick,
-        error_of: "lambda: relative to the refined run's. Felt force: what the currents give by the \
+        error_of: format!(
+            "lambda: relative to the refined run's. Felt force: what the currents give by the \
                    interpolated map against what they give directly in the refined field, relative \
                    to the force to be felt there, and what that field may be off by; the largest of places of \
                    the surface all over the maps' cells and up to its rim, times 1.25 for what lies between \
-                   them. `calibrate` has no refined run: it states bounds, which at loose tolerances are many times larger"
-            .to_owned(),
-        timed: "processor time of all threads: steel, points, forces with all force constants, and \
+                   them; {MEASURED}"
+        ),
+        timed:
+            "processor time of all threads: steel, points, forces with all force constants, and \
                 the part of the map that the object needs; the median where short enough to repeat"
-            .to_owned(),
+                .to_owned(),
         left_out: left_out(&scene, request),
         accuracy: accuracy(&shapes),
         shapes,

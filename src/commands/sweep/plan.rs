@@ -73,8 +73,8 @@ impl PlanRequest {
 /// when it is computed.
 ///
 /// # Errors
-/// Values that the design's keys do not take; sizes of a winding that each design finds for itself; files that it names that cannot be read; a search of arrays in which
-/// nothing varies.
+/// Values that the design's keys do not take; sizes of a winding that each design finds for itself; files that it
+/// names that cannot be read; a search of arrays in which nothing varies.
 pub fn plan(
     design: &Design,
     text: String,
