@@ -62,8 +62,16 @@ fn check_rendering(
     points: &[PointRow],
     currents: &[CurrentRow],
 ) -> Result<(), String> {
+    // Both came with schema 1.2.
     let Some(rendering) = &map.runtime.rendering else {
-        return Ok(());
+        return if manifest.circuit.is_some() || manifest.force.is_some() {
+            Err(
+                "map.npz lacks what position feedback needs (height_x_m and the arrays after it)"
+                    .to_owned(),
+            )
+        } else {
+            Ok(())
+        };
     };
     let of_points = HeightGrid::of_points(&manifest.points, points);
     same(

@@ -16,17 +16,17 @@ use std::io::{self, Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::array_check::{BEYOND, LARGEST, all_finite, all_within, bad, check_nodes};
+use super::array_check::{LARGEST, bad, check_nodes};
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
 use super::rendering::{
     DIRECTION, HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, ROBUST, Rendering,
-    Requested, SIDEWAYS_WEIGHT, STATIC_CURRENT, VOLTAGE, robust_numbers,
+    Requested, SIDEWAYS_WEIGHT, STATIC_CURRENT, VOLTAGE,
 };
 use super::stored;
 use fluxform_lambda::uncertainty::RobustRuntime;
 
-pub use super::array_check::NpzError;
+pub use super::array_check::{Array, NpzError};
 
 #[cfg(target_endian = "big")]
 compile_error!("arrays are written as they lie in memory, which must be little-endian");
@@ -118,72 +118,40 @@ impl MapArrays<'_> {
         Some([x, y])
     }
 
-    /// Checks how many numbers every array holds, and that each is finite and in range.
-    fn validate_numbers(&self, coils: usize) -> Result<(), NpzError> {
-        let nodes = self
-            .shape()
-            .iter()
-            .try_fold(1usize, |n, &size| n.checked_mul(size));
-        let [_, nz, ny, nx] = self.shape();
-        // Without a coil the product above is nothing, however many nodes there are.
-        let box_nodes = nz.checked_mul(ny).and_then(|n| n.checked_mul(nx));
-        let nodes = nodes.ok_or_else(|| bad(GZ, "is too large"))?;
-        let box_nodes = box_nodes.ok_or_else(|| bad(GZ, "is too large"))?;
+    /// Its arrays of real numbers in the order of the file: all but the version and the coils' indices.
+    #[must_use]
+    pub fn arrays<'s>(&'s self) -> Vec<Array<'s>> {
+        let [kept, nz, ny, nx] = self.shape();
         let runtime = &self.runtime;
-        let total = runtime.total_current_max_a.as_slice();
-        let lambda = runtime.lambda_n_per_m.as_slice();
-        let gradient = self.gradient_t_per_m_per_a.as_deref();
-        let field = self.field_t_per_a.as_deref();
-        let [gx, gy] = self.sides().unwrap_or_default();
-        let of_sides = self.sides_t_per_m_per_a.as_ref().map_or(0, |_| nodes);
-        let passive = self.passive_force_n.as_deref();
-        let working_point = self.working_point_gz_t_per_m.as_deref();
-        for (name, values, count) in [
-            (X, &*self.x_m, self.x_m.len()),
-            (Y, &*self.y_m, self.y_m.len()),
-            (Z, &*self.z_m, self.z_m.len()),
-            (GZ, &*self.gz_t_per_m_per_a, nodes),
-            (SIDES[0], gx, of_sides),
-            (SIDES[1], gy, of_sides),
-            (
-                GRADIENT,
-                gradient.unwrap_or_default(),
-                gradient.map_or(0, |_| nodes.saturating_mul(9)),
-            ),
-            (
-                FIELD,
-                field.unwrap_or_default(),
-                field.map_or(0, |_| nodes.saturating_mul(3)),
-            ),
-            (
-                PASSIVE,
-                passive.unwrap_or_default(),
-                passive.map_or(0, |_| box_nodes),
-            ),
-            (
-                WORKING_POINT,
-                working_point.unwrap_or_default(),
-                working_point.map_or(0, |_| box_nodes),
-            ),
-            (MOMENT, &runtime.moment_a_m2, 3),
-            (CURRENT_MIN, &runtime.current_min_a, coils),
-            (CURRENT_MAX, &runtime.current_max_a, coils),
-            (RESISTANCE, &runtime.resistance_ohm, coils),
-            (TOTAL, total, total.len()),
-            (LAMBDA, lambda, lambda.len()),
-        ] {
-            if values.len() != count {
-                let message = format!("must hold {count} numbers, holds {}", values.len());
-                return Err(bad(name, message));
-            }
-            if !all_finite(values) {
-                return Err(bad(name, "holds a number that is not finite"));
-            }
-            if !all_within(values, LARGEST) {
-                return Err(bad(name, BEYOND));
-            }
+        let coils = runtime.current_max_a.len();
+        let mut arrays = vec![
+            Array::new(X, &[nx], &*self.x_m),
+            Array::new(Y, &[ny], &*self.y_m),
+            Array::new(Z, &[nz], &*self.z_m),
+            Array::new(GZ, &[kept, nz, ny, nx], &*self.gz_t_per_m_per_a),
+        ];
+        let mut add = |name, shape: &[usize], values: Option<&'s [f64]>| {
+            arrays.extend(values.map(|values| Array::new(name, shape, values)));
+        };
+        for (name, values) in SIDES.into_iter().zip(self.sides().into_iter().flatten()) {
+            add(name, &[kept, nz, ny, nx], Some(values));
         }
-        Ok(())
+        let gradient = self.gradient_t_per_m_per_a.as_deref();
+        add(GRADIENT, &[kept, nz, ny, nx, 3, 3], gradient);
+        add(FIELD, &[kept, nz, ny, nx, 3], self.field_t_per_a.as_deref());
+        add(PASSIVE, &[nz, ny, nx], self.passive_force_n.as_deref());
+        let working_point = self.working_point_gz_t_per_m.as_deref();
+        add(WORKING_POINT, &[nz, ny, nx], working_point);
+        add(MOMENT, &[3], Some(&runtime.moment_a_m2));
+        add(CURRENT_MIN, &[coils], Some(&runtime.current_min_a));
+        add(CURRENT_MAX, &[coils], Some(&runtime.current_max_a));
+        add(RESISTANCE, &[coils], Some(&runtime.resistance_ohm));
+        let number = std::slice::from_ref;
+        add(TOTAL, &[], runtime.total_current_max_a.as_ref().map(number));
+        add(LAMBDA, &[], runtime.lambda_n_per_m.as_ref().map(number));
+        let rendering = runtime.rendering.as_ref();
+        arrays.extend(rendering.into_iter().flat_map(|it| it.arrays(coils)));
+        arrays
     }
 
     /// Checks lengths, order of the axes, coil indices, and that every number is finite.
@@ -204,7 +172,7 @@ impl MapArrays<'_> {
                 format!("must hold increasing indices below {coils}, the number of coils");
             return Err(bad(COIL, message));
         }
-        self.validate_numbers(coils)?;
+        self.arrays().iter().try_for_each(Array::check)?;
         for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
             check_nodes(name, nodes)?;
         }
@@ -212,7 +180,7 @@ impl MapArrays<'_> {
         let Some(rendering) = &runtime.rendering else {
             return Ok(());
         };
-        rendering.validate(coils)?;
+        rendering.validate()?;
         if rendering.requested.is_some() && self.sides_t_per_m_per_a.is_none() {
             return Err(NpzError::Missing(SIDES[0]));
         }
@@ -235,17 +203,12 @@ impl MapArrays<'_> {
 /// As [`MapArrays::validate`].
 pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
     map.validate()?;
-    let sides = map.sides().map_or(0, |[x, y]| x.len() + y.len());
-    let numbers = map.gz_t_per_m_per_a.len()
-        + sides
-        + map.gradient_t_per_m_per_a.as_ref().map_or(0, |a| a.len())
-        + map.field_t_per_a.as_ref().map_or(0, |a| a.len())
-        + map.passive_force_n.as_ref().map_or(0, |a| a.len())
-        + map.working_point_gz_t_per_m.as_ref().map_or(0, |a| a.len());
+    let arrays = map.arrays();
+    let numbers: usize = arrays.iter().map(|array| array.values.len()).sum();
     let room = numbers * npy::ELEMENT_BYTES + (64 << 10);
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::with_capacity(room))));
     archive
-        .put_all(map)
+        .put_all(&map.coil, &arrays)
         .and_then(|()| archive.0.finish().map_err(io::Error::other))
         .map(Cursor::into_inner)
         .map_err(|error| NpzError::Archive(error.to_string()))
@@ -257,87 +220,21 @@ const BLOCK_BYTES: usize = 1 << 20;
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {
-    fn put_all(&mut self, map: &MapArrays) -> io::Result<()> {
+    fn put_all(&mut self, coil: &[i64], arrays: &[Array]) -> io::Result<()> {
         let version: Vec<i64> = parse_version(SCHEMA_VERSION)
             .unwrap_or_default()
             .map(i64::from)
             .to_vec();
-        let [coils, nz, ny, nx] = map.shape();
-        let runtime = &map.runtime;
         self.put_i64(VERSION, &version)?;
-        self.put(X, &[nx], &map.x_m)?;
-        self.put(Y, &[ny], &map.y_m)?;
-        self.put(Z, &[nz], &map.z_m)?;
-        self.put_i64(COIL, &map.coil)?;
-        self.put(GZ, &[coils, nz, ny, nx], &map.gz_t_per_m_per_a)?;
-        for (name, values) in SIDES.into_iter().zip(map.sides().into_iter().flatten()) {
-            self.put(name, &[coils, nz, ny, nx], values)?;
-        }
-        if let Some(values) = &map.gradient_t_per_m_per_a {
-            self.put(GRADIENT, &[coils, nz, ny, nx, 3, 3], values)?;
-        }
-        if let Some(values) = &map.field_t_per_a {
-            self.put(FIELD, &[coils, nz, ny, nx, 3], values)?;
-        }
-        for (name, values) in [
-            (PASSIVE, &map.passive_force_n),
-            (WORKING_POINT, &map.working_point_gz_t_per_m),
-        ] {
-            if let Some(values) = values {
-                self.put(name, &[nz, ny, nx], values)?;
-            }
-        }
-        self.put(MOMENT, &[3], &runtime.moment_a_m2)?;
-        for (name, values) in [
-            (CURRENT_MIN, &runtime.current_min_a),
-            (CURRENT_MAX, &runtime.current_max_a),
-            (RESISTANCE, &runtime.resistance_ohm),
-        ] {
-            self.put(name, &[values.len()], values)?;
-        }
-        for (name, value) in [
-            (TOTAL, runtime.total_current_max_a),
-            (LAMBDA, runtime.lambda_n_per_m),
-        ] {
-            if let Some(value) = value {
-                self.put(name, &[], &[value])?;
-            }
-        }
-        runtime
-            .rendering
-            .as_ref()
-            .map_or(Ok(()), |rendering| self.put_rendering(rendering))
+        let (axes, others) = arrays.split_at(3);
+        axes.iter().try_for_each(|array| self.put(array))?;
+        self.put_i64(COIL, coil)?;
+        others.iter().try_for_each(|array| self.put(array))
     }
 
-    fn put_rendering(&mut self, rendering: &Rendering) -> io::Result<()> {
-        let heights = &rendering.heights;
-        let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
-        let coils = rendering.static_current_a.len();
-        self.put(HEIGHT_X, &[nx], &heights.x_m)?;
-        self.put(HEIGHT_Y, &[ny], &heights.y_m)?;
-        self.put(HEIGHT, &[ny, nx], &heights.height_m)?;
-        self.put(HAS_HEIGHT, &[ny, nx], &heights.has_height)?;
-        self.put(STATIC_CURRENT, &[coils], &rendering.static_current_a)?;
-        self.put(INDUCTANCE, &[coils, coils], &rendering.inductance_h)?;
-        if let Some(voltage) = rendering.voltage_v {
-            self.put(VOLTAGE, &[], &[voltage])?;
-        }
-        if let Some(robust) = &rendering.robust {
-            self.put(ROBUST, &[5], &robust_numbers(robust))?;
-        }
-        let Some(requested) = &rendering.requested else {
-            return Ok(());
-        };
-        self.put(DIRECTION, &[ny, nx, 3], &requested.direction)?;
-        self.put(SIDEWAYS_WEIGHT, &[], &[requested.sideways_weight])
-    }
-
-    fn put(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
-        self.put_bytes(
-            name,
-            &npy::header("<f8", shape),
-            bytemuck::cast_slice(values),
-        )
+    fn put(&mut self, array: &Array) -> io::Result<()> {
+        let header = npy::header("<f8", &array.shape);
+        self.put_bytes(array.name, &header, bytemuck::cast_slice(&array.values))
     }
 
     fn put_i64(&mut self, name: &str, values: &[i64]) -> io::Result<()> {

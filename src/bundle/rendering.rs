@@ -15,9 +15,7 @@
 //! from where it is measured (m), mean square and mean of its strength over the stated one, mean square of a
 //! driver's relative error.
 
-use std::borrow::Cow;
-
-use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
+use super::array_check::{Array, NpzError, bad, check_nodes};
 use super::manifest::PointsGrid;
 use super::table::PointRow;
 use fluxform_lambda::uncertainty::RobustRuntime;
@@ -31,7 +29,8 @@ pub(super) const INDUCTANCE: &str = "inductance_h";
 pub(super) const VOLTAGE: &str = "voltage_v";
 pub(super) const DIRECTION: &str = "requested_direction";
 pub(super) const SIDEWAYS_WEIGHT: &str = "sideways_weight";
-pub(super) const ROBUST: &str = "robust_setting";
+/// The setting for uncertainties: five numbers, each of its own kind.
+pub const ROBUST: &str = "robust_setting";
 
 /// A smaller sideways weight could not be distinguished from rounding.
 const LEAST_WEIGHT: f64 = 1e-6;
@@ -64,57 +63,38 @@ pub struct Requested {
 }
 
 impl Rendering {
-    /// Every array by its name in `map.npz`, with how many numbers it must hold for an array of `coils`; empty where
-    /// there is none.
-    #[must_use]
-    pub fn arrays(&self, coils: usize) -> [(&'static str, Cow<'_, [f64]>, usize); 10] {
+    /// Its arrays in `map.npz`, for an array of `coils`.
+    pub(super) fn arrays(&self, coils: usize) -> Vec<Array<'_>> {
         let heights = &self.heights;
         let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
-        let nodes = nx.saturating_mul(ny);
-        let requested = self.requested.as_ref();
-        let direction = requested.map_or(&[][..], |requested| &requested.direction);
-        let of_direction = requested.map_or(0, |_| nodes.saturating_mul(3));
-        let weight: Vec<f64> = requested.map(|it| it.sideways_weight).into_iter().collect();
-        let robust = self.robust.as_ref().map(robust_numbers);
-        let robust: Vec<f64> = robust.into_iter().flatten().collect();
-        let (of_weight, of_robust) = (weight.len(), robust.len());
-        let voltage = self.voltage_v.as_slice();
-        [
-            (HEIGHT_X, heights.x_m[..].into(), nx),
-            (HEIGHT_Y, heights.y_m[..].into(), ny),
-            (HEIGHT, heights.height_m[..].into(), nodes),
-            (HAS_HEIGHT, heights.has_height[..].into(), nodes),
-            (STATIC_CURRENT, self.static_current_a[..].into(), coils),
-            (
-                INDUCTANCE,
-                self.inductance_h[..].into(),
-                coils.saturating_mul(coils),
-            ),
-            (VOLTAGE, voltage.into(), voltage.len()),
-            (DIRECTION, direction.into(), of_direction),
-            (SIDEWAYS_WEIGHT, weight.into(), of_weight),
-            (ROBUST, robust.into(), of_robust),
-        ]
+        let mut arrays = vec![
+            Array::new(HEIGHT_X, &[nx], &heights.x_m),
+            Array::new(HEIGHT_Y, &[ny], &heights.y_m),
+            Array::new(HEIGHT, &[ny, nx], &heights.height_m),
+            Array::new(HAS_HEIGHT, &[ny, nx], &heights.has_height),
+            Array::new(STATIC_CURRENT, &[coils], &self.static_current_a),
+            Array::new(INDUCTANCE, &[coils, coils], &self.inductance_h),
+        ];
+        if let Some(voltage) = &self.voltage_v {
+            arrays.push(Array::new(VOLTAGE, &[], std::slice::from_ref(voltage)));
+        }
+        if let Some(robust) = &self.robust {
+            arrays.push(Array::new(ROBUST, &[5], robust_numbers(robust).to_vec()));
+        }
+        if let Some(requested) = &self.requested {
+            let weight = std::slice::from_ref(&requested.sideways_weight);
+            arrays.push(Array::new(DIRECTION, &[ny, nx, 3], &requested.direction));
+            arrays.push(Array::new(SIDEWAYS_WEIGHT, &[], weight));
+        }
+        arrays
     }
 
-    /// Lengths, finite numbers and order, for an array of `coils`.
-    pub(super) fn validate(&self, coils: usize) -> Result<(), NpzError> {
+    /// Order and ranges of what its arrays hold.
+    pub(super) fn validate(&self) -> Result<(), NpzError> {
         let heights = &self.heights;
         for (name, nodes) in [(HEIGHT_X, &heights.x_m), (HEIGHT_Y, &heights.y_m)] {
             if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
                 return Err(bad(name, "must increase from node to node"));
-            }
-        }
-        for (name, values, count) in self.arrays(coils) {
-            if values.len() != count {
-                let message = format!("must hold {count} numbers, holds {}", values.len());
-                return Err(bad(name, message));
-            }
-            if !values.iter().all(|value| value.is_finite()) {
-                return Err(bad(name, "holds a number that is not finite"));
-            }
-            if !all_within(&values, LARGEST) {
-                return Err(bad(name, BEYOND));
             }
         }
         check_nodes(HEIGHT_X, &heights.x_m)?;

@@ -188,7 +188,7 @@ use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [every_forgery_with_fitting_checksums_is_noticed, regression_what_steers_a_vector_was_believed_of_another_platform, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
+        None => [every_forgery_with_fitting_checksums_is_noticed, regression_what_steers_a_vector_was_believed_of_another_platform, regression_a_tilted_magnets_forces_were_believed_of_another_program, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
     }
 }
 
@@ -556,7 +556,7 @@ fn regression_what_steers_a_vector_was_believed_of_another_platform() {
                 .for_each(|part| *part = -*part);
         }),
         ("the price of power", false, |p| {
-            p.rendering().robust.as_mut().unwrap().price_n2_per_w *= 1e3;
+            p.rendering().robust.as_mut().unwrap().price_n2_per_w *= 1.01;
         }),
         ("where there is a surface", false, |p| {
             let has = &mut p.rendering().heights.has_height;
@@ -569,6 +569,35 @@ fn regression_what_steers_a_vector_was_believed_of_another_platform() {
         let target = folder.path().join(name.replace(' ', "-"));
         parts.write(&target);
         assert_eq!(passes(&mut verifier, &target).0, expected, "{name}");
+    }
+}
+
+/// The tensor that gives a tilted magnet's force was neither sampled nor named as not checked.
+fn regression_a_tilted_magnets_forces_were_believed_of_another_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = format!("{DESIGN}[magnet]\ntilt_deg = [5, 3]\n");
+    let mut honest = Parts::of(&calibrated(folder.path(), &design, SHAPE, false));
+    honest.manifest.fluxform_version = "0.0.9".to_owned();
+    honest.lambda.fluxform_version = "0.0.9".to_owned();
+    let mut verifier = Verifier::default();
+    let forgeries: [(&str, Change); 3] = [
+        ("nothing", |_| {}),
+        ("every gradient", |p| {
+            let tensors = p.map.gradient_t_per_m_per_a.as_mut().unwrap();
+            tensors.to_mut().iter_mut().for_each(|part| *part *= 2.0);
+        }),
+        ("a gradient at the top", |p| {
+            let tensors = p.map.gradient_t_per_m_per_a.as_mut().unwrap();
+            *tensors.to_mut().last_mut().unwrap() *= 1.001;
+        }),
+    ];
+    for (name, forge) in forgeries {
+        let mut parts = honest.clone();
+        forge(&mut parts);
+        let target = folder.path().join(name.replace(' ', "-"));
+        parts.write(&target);
+        let (passed, _) = passes(&mut verifier, &target);
+        assert_eq!(passed, name == "nothing", "{name}");
     }
 }
 

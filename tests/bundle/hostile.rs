@@ -4,10 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use fluxform::bundle::artefact::sha256_hex;
-use fluxform::bundle::json::to_json;
 use fluxform::bundle::load::{Bundle, BundleError};
-use fluxform::bundle::seal::sealed;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use fluxform_testing::bundle::*;
 use fluxform_testing::needs::{self, Trial};
@@ -20,15 +18,6 @@ pub fn trials() -> Vec<Trial> {
         None => [hostile_and_damaged_bundles_are_refused, another_minor_version_is_read],
         needs::numpy() => [python_refuses_hostile_and_damaged_bundles],
     }
-}
-
-/// A bundle's manifest, edited, its own digest made again.
-fn edit_manifest(target: &Path, edit: impl FnOnce(&mut Value)) {
-    let path = target.join("manifest.json");
-    let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-    manifest.as_object_mut().unwrap().remove("record_sha256");
-    edit(&mut manifest);
-    fs::write(&path, sealed(to_json(&manifest).unwrap())).unwrap();
 }
 
 /// Has hostile and damaged bundles refused by the library, and then by `refused`.

@@ -134,6 +134,10 @@ fn contradictions_and_bad_numbers_are_not_written() {
         "map.npz and currents.csv agree",
     );
     refuse(
+        |s| s.map.runtime.rendering = None,
+        "lacks what position feedback needs",
+    );
+    refuse(
         |s| s.currents[1].current_a = 0.1,
         "currents.csv and lambda.json agree",
     );

@@ -7,8 +7,9 @@ use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::{Criterion, ForceConstants};
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::uncertainty::Uncertainty;
-use fluxform_bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use fluxform_bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, sha256_hex};
 use fluxform_bundle::atomic::WriteError;
+use fluxform_bundle::json::to_json;
 use fluxform_bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
 use fluxform_bundle::manifest::*;
 use fluxform_bundle::npz::{MapArrays, Runtime, SIDES};
@@ -19,11 +20,33 @@ use fluxform_bundle::timing::StageSeconds;
 use fluxform_bundle::write::{BundleContent, write_bundle};
 use fluxform_lambda::uncertainty::RobustRuntime;
 use fluxform_numerics::axis::Axis;
+use serde_json::Value;
 
 /// The text of a record that was changed, its own digest made again.
 pub fn resealed(record: &str) -> Vec<u8> {
     let (bare, _) = record.rsplit_once(',').unwrap();
     sealed(format!("{bare}\n}}\n").into_bytes())
+}
+
+/// A bundle's manifest, edited, its own digest made again.
+pub fn edit_manifest(target: &Path, edit: impl FnOnce(&mut Value)) {
+    let path = target.join("manifest.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    manifest.as_object_mut().unwrap().remove("record_sha256");
+    edit(&mut manifest);
+    std::fs::write(&path, sealed(to_json(&manifest).unwrap())).unwrap();
+}
+
+/// A bundle's `map.npz`, replaced, its size and digest in the manifest made again.
+pub fn replace_map(target: &Path, bytes: &[u8]) {
+    std::fs::write(target.join("map.npz"), bytes).unwrap();
+    edit_manifest(target, |manifest| {
+        let files = manifest["files"].as_array_mut().unwrap();
+        let entry = files.iter_mut().find(|file| file["path"] == "map.npz");
+        let entry = entry.unwrap();
+        entry["bytes"] = bytes.len().into();
+        entry["sha256"] = sha256_hex(bytes).into();
+    });
 }
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.

@@ -10,7 +10,7 @@ use crate::RunError;
 use crate::bundle::cache::Store;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
-use crate::bundle::rendering::Rendering;
+use crate::bundle::npz::Array;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
 use crate::progress::Progress;
@@ -30,8 +30,8 @@ pub struct Expected {
     pub points: Vec<PointRow>,
     /// Names of the files that are copies of its inputs.
     pub copies: Vec<String>,
-    /// Of `map.npz` what serves position feedback.
-    pub rendering: Option<Rendering>,
+    /// The arrays of `map.npz`.
+    pub map: Vec<Array<'static>>,
     /// How its points count in the mean; `None`: all alike.
     pub weights: Option<Vec<f64>>,
 }
@@ -64,12 +64,11 @@ pub fn expected(
         options,
     };
     let object = calibration.points(progress)?;
-    let mut rendering = None;
     let seal = |content: &BundleContent, _: &LambdaReport| {
-        rendering.clone_from(&content.map.runtime.rendering);
-        Ok(sealed_manifest(content)?)
+        let arrays = content.map.arrays().into_iter().map(Array::into_owned);
+        Ok((sealed_manifest(content)?, arrays.collect()))
     };
-    let (manifest, lambda) = calibration.compute(&object, progress, seal)?;
+    let ((manifest, map), lambda) = calibration.compute(&object, progress, seal)?;
     let forces = object.force_points(&calibration);
     let named = scene.files.iter().map(|file| file.kept_name.clone());
     Ok(Expected {
@@ -77,7 +76,7 @@ pub fn expected(
         copies: std::iter::once(DESIGN_FILE.to_owned())
             .chain(named)
             .collect(),
-        rendering,
+        map,
         weights: forces.weights().map(<[f64]>::to_vec),
         points: forces.rows(),
         lambda: lambda.file,

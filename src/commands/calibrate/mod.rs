@@ -496,12 +496,12 @@ impl Calibration<'_> {
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
     /// with its list of files.
-    fn compute(
+    fn compute<T>(
         &self,
         object: &ObjectPoints,
         progress: &dyn Progress,
-        take: impl FnOnce(&BundleContent, &LambdaReport) -> Result<Manifest, RunError>,
-    ) -> Result<(Manifest, LambdaReport), RunError> {
+        take: impl FnOnce(&BundleContent, &LambdaReport) -> Result<T, RunError>,
+    ) -> Result<(T, LambdaReport), RunError> {
         let (scene, solved, field) = (self.scene, self.solved, self.field);
         let search = object.search.as_ref();
         let heights = object.heights.as_ref().unwrap_or(&object.found);

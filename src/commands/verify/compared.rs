@@ -17,8 +17,11 @@ use crate::bundle::artefact::{
     FLUXFORM_VERSION, FileEntry, SCHEMA_VERSION, arithmetic, sha256_hex,
 };
 use crate::bundle::load::Bundle;
+use crate::bundle::npz::{Array, PASSIVE};
+use crate::bundle::rendering::ROBUST;
 use crate::bundle::seal::to_record;
 use crate::bundle::table::PointRow;
+use crate::commands::calibrate::PASSIVE_STAGE;
 use crate::commands::calibrate::again::Expected;
 
 /// Differences that are named.
@@ -28,6 +31,8 @@ const NAMED: usize = 6;
 const ROUNDING: f64 = 1e-7;
 /// How much a result may move with the stated errors of forces and map.
 const MOVES: f64 = 10.0;
+/// The stages that results follow from.
+const RESULTS: [&str; 4] = ["forces", "map", "inductances", "passive_force"];
 /// Estimates of errors that are dominated by rounding differ by at most this factor.
 const ESTIMATES: f64 = 8.0;
 /// Keys of such estimates.
@@ -110,9 +115,9 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         return exactly(bundle, expected, [stored, again]);
     }
     let mut faults = Vec::new();
-    let tolerance = tolerance(expected);
+    let tolerance = tolerance(expected, &RESULTS);
     let mut unchecked = vec![format!(
-        "the last bits of numbers, and the map's values at nodes that were not computed again: made by fluxform {} on {}; verify there",
+        "the last bits of numbers: made by fluxform {} on {}; verify there",
         bundle.manifest.fluxform_version,
         made_on(bundle)
     )];
@@ -140,20 +145,13 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         }
         differences.add("lambda.json", &stored, &again);
     }
+    differences.add_map(&bundle.map.arrays(), expected);
     faults.extend(differences.faults);
     if !differences.unchecked.is_empty() {
         let named = differences.unchecked.join(", ");
         unchecked.push(format!(
             "entries that another program words or has otherwise: {named}"
         ));
-    }
-    let coils = bundle.map.runtime.resistance_ohm.len();
-    if let [Some(stored), Some(again)] = [&bundle.map.runtime.rendering, &expected.rendering] {
-        for ((name, a, _), (_, b, _)) in stored.arrays(coils).into_iter().zip(again.arrays(coils)) {
-            if !same_array(&a, &b, tolerance) {
-                faults.push(format!("map.npz {name}"));
-            }
-        }
     }
     if !same_points(&bundle.points, &expected.points) {
         faults.push("points.csv".to_owned());
@@ -269,11 +267,38 @@ fn kept_and_pages(
     }
 }
 
-/// Whether no number differs by more than `tolerance` times the largest.
-fn same_array(stored: &[f64], again: &[f64], tolerance: f64) -> bool {
-    let largest = again.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
-    let mut pairs = stored.iter().zip(again);
-    stored.len() == again.len() && pairs.all(|(a, b)| (a - b).abs() <= tolerance * largest)
+/// The stages that an array of `map.npz` follows from: fields by coil and height, the pull by height, what else a
+/// runtime needs.
+fn stages(array: &Array) -> &'static [&'static str] {
+    if array.name == PASSIVE {
+        &[PASSIVE_STAGE]
+    } else if array.shape.len() >= 4 {
+        &["map"]
+    } else {
+        &RESULTS
+    }
+}
+
+/// Whether no number differs by more than `tolerance` times the largest beside it: of fields at the same height, of
+/// settings alone, else of the array.
+fn same_array(stored: &Array, again: &Array, tolerance: f64) -> bool {
+    let (block, levels) = match again.shape[..] {
+        [_, nz, ..] if again.shape.len() >= 4 => (again.shape[2..].iter().product(), nz),
+        _ if again.name == ROBUST => (1, again.values.len()),
+        _ => (again.values.len(), 1),
+    };
+    let block = block.max(1);
+    let mut largest = vec![0.0_f64; levels];
+    for (at, values) in again.values.chunks(block).enumerate() {
+        let most = &mut largest[at % levels];
+        *most = values.iter().fold(*most, |most, b| most.max(b.abs()));
+    }
+    let blocks = stored.values.chunks(block).zip(again.values.chunks(block));
+    stored.shape == again.shape
+        && blocks.enumerate().all(|(at, (stored, again))| {
+            let most = tolerance * largest[at % levels];
+            stored.iter().zip(again).all(|(a, b)| (a - b).abs() <= most)
+        })
 }
 
 fn same_points(stored: &[PointRow], again: &[PointRow]) -> bool {
@@ -288,16 +313,13 @@ fn same_points(stored: &[PointRow], again: &[PointRow]) -> bool {
         })
 }
 
-/// How far numbers may be from those computed again, relative; of this program's own bounds.
-fn tolerance(expected: &Expected) -> f64 {
-    let stage = |name: &str| {
-        let stage = expected.manifest.accuracy.get(name);
-        stage.map_or(0.0, |stage| stage.estimate)
-    };
-    let largest = ["forces", "map", "inductances", "passive_force"]
-        .map(stage)
-        .into_iter()
-        .fold(0.0, f64::max);
+/// How far numbers that follow from these stages may be from those computed again, relative; of this program's own
+/// bounds.
+fn tolerance(expected: &Expected, stages: &[&str]) -> f64 {
+    let stated = stages
+        .iter()
+        .filter_map(|name| expected.manifest.accuracy.get(*name));
+    let largest = stated.fold(0.0_f64, |most, stage| most.max(stage.estimate));
     (MOVES * largest).max(ROUNDING)
 }
 
@@ -318,6 +340,22 @@ impl Differences {
             tolerance,
             faults: Vec::new(),
             unchecked: Vec::new(),
+        }
+    }
+
+    /// The arrays of `map.npz`.
+    fn add_map(&mut self, stored: &[Array], expected: &Expected) {
+        let again = &expected.map[..];
+        let names = stored.iter().chain(again).map(|array| array.name);
+        for name in names.collect::<BTreeSet<&str>>() {
+            let at = format!("map.npz {name}");
+            let sides = [stored, again].map(|side| side.iter().find(|array| array.name == name));
+            match sides {
+                [Some(a), Some(b)] if same_array(a, b, tolerance(expected, stages(b))) => {}
+                [Some(_), Some(_)] => self.faults.push(at),
+                _ if self.made_by == MadeBy::Another => self.unchecked.push(at),
+                _ => self.faults.push(at),
+            }
         }
     }
 

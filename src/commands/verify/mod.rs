@@ -278,7 +278,7 @@ impl<'a> Verifier<'a> {
         let Some(shape) = &sources.shape else {
             all.unchecked.push(format!(
                 "points, requested directions, lambda's path and what follows from lambda, the setting for \
-                 uncertainties, pages, plots, texts and stated errors: {}",
+                 uncertainties, tensors and fields of the map, pages, plots, texts and stated errors: {}",
                 sources.without_shape()
             ));
             return Ok(None);
