@@ -153,15 +153,15 @@ pub fn two_fingers(
 }
 
 /// Leaves in `currents_a`, whose currents must be within the limits, those of least power that give every
-/// force: each a row of forces per ampere (N/A) and the force requested (N); where the limits forbid that,
-/// those of the least sum of squared errors. That sum's root, N.
-pub fn allocate(limits: &ForceProblem, rows: &[(&[f64], f64)], currents_a: &mut [f64]) -> f64 {
+/// force: each a row of forces per ampere (N/A), the force requested (N), and the share of its error that counts (above
+/// 0); where the limits forbid that, those of the least sum of such errors' squares. That sum's root, N.
+pub fn allocate(limits: &ForceProblem, rows: &[(&[f64], f64, f64)], currents_a: &mut [f64]) -> f64 {
     let mut form = ErrorForm::new(currents_a.len());
     let mut strongest = 0.0_f64;
-    for (row, requested_n) in rows {
+    for &(row, requested_n, share) in rows {
         strongest = row.iter().fold(strongest, |most, g| most.max(g.abs()));
-        form.add_square(row, 1.0, 0.0);
-        form.add_target(row, *requested_n, 1.0, 1.0);
+        form.add_square(row, share * share, 0.0);
+        form.add_target(row, requested_n, 1.0, share * share);
     }
     let ohm = limits.resistance_ohm.iter().copied();
     let least_ohm = ohm.fold(f64::INFINITY, f64::min);
@@ -228,7 +228,7 @@ fn one_pair(
     let solved = |first_axis: usize| -> (bool, f64) {
         let fingers = (0..2).flat_map(|finger| (first_axis..3).map(move |axis| (finger, axis)));
         let rows: Vec<_> = fingers
-            .map(|(finger, axis)| (row(finger, axis), requested(finger, axis)))
+            .map(|(finger, axis)| (row(finger, axis), requested(finger, axis), 1.0))
             .collect();
         let mut currents = vec![0.0; coils];
         let error_n = allocate(upward, &rows, &mut currents);

@@ -114,7 +114,7 @@ fn both_get_their_force_from_coils_and_from_the_other_s_magnet() {
 }
 
 #[test]
-fn neither_is_the_first_and_one_outside_counts_for_nothing() {
+fn neither_is_the_first() {
     let opened = both_ways().open("flat");
     let trajectory = pairs(40);
     let swapped = Trajectory {
@@ -130,24 +130,94 @@ fn neither_is_the_first_and_one_outside_counts_for_nothing() {
     for (a, b) in one.first.force_n.iter().zip(&other.second.unwrap().force_n) {
         assert!((a - b).abs() < 1e-9);
     }
-    let alone = Trajectory {
-        second_m: Vec::new(),
-        ..trajectory.clone()
-    };
-    let alone = replayed(&opened, &alone).unwrap().rows;
-    let beside = Trajectory {
-        second_m: vec![[0.3, 0.0, 0.05]; trajectory.len()],
-        ..trajectory
-    };
-    let beside = replayed(&opened, &beside).unwrap().rows;
-    assert_eq!(beside.second.as_ref().unwrap().answer[0], Answer::Outside);
-    for (row, answer) in alone.first.answer.iter().enumerate() {
-        if *answer == Answer::Ok {
-            let pairs = alone.currents_a(row).iter().zip(beside.currents_a(row));
-            let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(apart < 1e-5, "{row}: {apart}");
+}
+
+#[test]
+fn a_finger_outside_the_map_counts_for_nothing() {
+    let outside = vec![[0.3, 0.0, 0.05]; 40];
+    for bundles in [both_ways(), both_ways_along_the_normal()] {
+        let opened = bundles.open("flat");
+        let Trajectory {
+            position_m, t_s, ..
+        } = pairs(40);
+        let replay = |position_m: &[[f64; 3]], second_m: &[[f64; 3]]| {
+            let trajectory = Trajectory {
+                position_m: position_m.to_vec(),
+                second_m: second_m.to_vec(),
+                t_s: t_s.clone(),
+            };
+            replayed(&opened, &trajectory).unwrap().rows
+        };
+        let alone = replay(&position_m, &[]);
+        let first = replay(&position_m, &outside);
+        assert_eq!(first.second.as_ref().unwrap().answer[0], Answer::Outside);
+        let second = replay(&outside, &position_m);
+        assert_eq!(alone.first, first.first);
+        assert_eq!(Some(&alone.first), second.second.as_ref());
+        assert_eq!(alone.current_a, first.current_a);
+        assert_eq!(alone.current_a, second.current_a);
+    }
+}
+
+#[test]
+fn out_of_reach_a_sideways_error_counts_by_its_weight() {
+    let opened = both_ways_along_the_normal().open("flat");
+    let rows = replayed(&opened, &pairs(100)).unwrap().rows;
+    let runtime = &opened.bundle.map.runtime;
+    let requested = runtime.rendering.as_ref().unwrap().requested.as_ref();
+    let weight = requested.unwrap().sideways_weight;
+    let fingers: Vec<&FingerRows> = rows.fingers().collect();
+    let mut per_ampere = [vec![[0.0; 3]; rows.coils], vec![[0.0; 3]; rows.coils]];
+    let mut saturated = 0;
+    for row in 0..rows.len() {
+        if fingers
+            .iter()
+            .all(|finger| finger.answer[row] == Answer::Ok)
+        {
+            continue;
+        }
+        saturated += 1;
+        let mut errors_n = [[0.0; 3]; 2];
+        for (at, finger) in fingers.iter().enumerate() {
+            opened
+                .bundle
+                .force_vector_per_ampere(finger.position_m[row], &mut per_ampere[at]);
+            let [x, y] = finger.sideways_n[row];
+            let request = expected(finger, row);
+            errors_n[at] = [
+                x - request[0],
+                y - request[1],
+                finger.force_n[row] - request[2],
+            ];
+        }
+        // Along every current that may move, the weighted square of the errors does not fall.
+        let currents_a = rows.currents_a(row);
+        let sum: f64 = currents_a.iter().sum();
+        for coil in 0..rows.coils {
+            let mut slope = 0.0;
+            let mut size = 0.0;
+            for (errors, forces) in errors_n.iter().zip(&per_ampere) {
+                for (axis, share) in [weight, weight, 1.0].into_iter().enumerate() {
+                    let term = 2.0 * share * share * errors[axis] * forces[coil][axis];
+                    slope += term;
+                    size += term.abs();
+                }
+            }
+            let room = 1e-9;
+            let total = runtime.total_current_max_a.unwrap_or(f64::INFINITY);
+            let up = currents_a[coil] < runtime.current_max_a[coil] - room && sum < total - room;
+            let down = currents_a[coil] > runtime.current_min_a[coil] + room;
+            assert!(
+                !up || slope > -1e-3 * size,
+                "{row}, coil {coil}: {slope} of {size}"
+            );
+            assert!(
+                !down || sum > total - room || slope < 1e-3 * size,
+                "{row}, coil {coil}: {slope} of {size}"
+            );
         }
     }
+    assert!(saturated > 10, "{saturated}");
 }
 
 #[test]

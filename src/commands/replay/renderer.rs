@@ -89,6 +89,8 @@ struct VectorPart {
     allocator: VectorAllocator,
     /// [y, x, 3] on the nodes of the heights: the force over lambda times the height.
     direction: Vec<f64>,
+    /// Out of reach a sideways error counts as this share of an upward one.
+    sideways_weight: f64,
     force_n_per_a: Vec<[f64; 3]>,
 }
 
@@ -195,6 +197,7 @@ impl Renderer {
                 force_n_per_a: vec![[0.0; 3]; allocator.coils()],
                 allocator,
                 direction: requested.direction.clone(),
+                sideways_weight: requested.sideways_weight,
             })
         });
         Ok(Self {
@@ -426,9 +429,9 @@ impl Renderer {
     }
 
     /// Writes the currents (A) to command with fingers at both positions, m: those of least power that give both
-    /// their force, or the nearest in the sum of squares. Their magnets push each other as dipoles do, which
-    /// the currents make up for; the force on the second one is stated too, N. A finger outside the map is given
-    /// nothing and counts for nothing.
+    /// their force, or the nearest in the sum of squares, sideways errors counting as for one finger. Their magnets push
+    /// each other as dipoles do, which the currents make up for; the force on the second one is stated too, N. A finger
+    /// outside the map counts for nothing: the other has its own currents.
     ///
     /// # Panics
     /// When `currents_a` is shorter than the array.
@@ -443,34 +446,40 @@ impl Renderer {
             steps[finger] = self.step(positions_m[finger], currents_a);
             self.remember(finger);
         }
-        let mut on_second = [0.0; 3];
-        let Some(part) = &mut self.pair else {
-            return (steps, on_second);
+        if steps[1].answer == Answer::Outside {
+            // The first finger's currents were overwritten; outside the map as well, there are none.
+            steps[0] = self.step(positions_m[0], currents_a);
+        }
+        let inside = steps.map(|step| step.answer != Answer::Outside);
+        let part = self.pair.as_mut().filter(|_| inside == [true; 2]);
+        let Some(part) = part else {
+            return (steps, [0.0; 3]);
         };
         let currents = &mut currents_a[..part.limits.resistance_ohm.len()];
         currents.fill(0.0);
-        let inside = steps.map(|step| step.answer != Answer::Outside);
-        if inside == [true; 2] {
-            let [first, second] = positions_m;
-            let between = std::array::from_fn(|axis| second[axis] - first[axis]);
-            on_second = between_magnets_n(part.moment_a_m2, between);
-            let pushes = [on_second.map(|push| -push), on_second];
-            for (step, push) in steps.iter_mut().zip(pushes) {
-                for (sum, push) in step.without_currents_n.iter_mut().zip(push) {
-                    *sum += push;
-                }
+        let [first, second] = positions_m;
+        let between = std::array::from_fn(|axis| second[axis] - first[axis]);
+        let on_second = between_magnets_n(part.moment_a_m2, between);
+        let pushes = [on_second.map(|push| -push), on_second];
+        for (step, push) in steps.iter_mut().zip(pushes) {
+            for (sum, push) in step.without_currents_n.iter_mut().zip(push) {
+                *sum += push;
             }
         }
-        let of_vector = self.vector.is_some();
-        let first_axis = if of_vector { 0 } else { 2 };
+        let weight = self.vector.as_ref().map(|vector| vector.sideways_weight);
+        let first_axis = if weight.is_some() { 0 } else { 2 };
+        let sideways = weight.unwrap_or(1.0);
+        let shares = [sideways, sideways, 1.0];
         let mut rows = Vec::with_capacity(6);
-        for (finger, step) in steps.iter().enumerate().filter(|(at, _)| inside[*at]) {
+        for (finger, step) in steps.iter().enumerate() {
             let requested_n = step.wanted_force_n().into_iter();
             let of_currents = requested_n
                 .zip(step.without_currents_n)
                 .map(|(all, n)| all - n);
             let axes = part.axes_n_per_a[finger].iter().map(Vec::as_slice);
-            rows.extend(axes.zip(of_currents).skip(first_axis));
+            let all = axes.zip(of_currents).zip(shares);
+            let all = all.map(|((axis, requested_n), share)| (axis, requested_n, share));
+            rows.extend(all.skip(first_axis));
         }
         allocate(&part.limits.problem(), &rows, currents);
         let given = self.pair_given_n(&steps, currents);
@@ -480,9 +489,6 @@ impl Renderer {
             .flat_map(|step| [step.wanted_force_n(), step.without_currents_n]);
         let tolerated_n = GIVEN * terms.map(length).fold(0.0, f64::max);
         for (step, force) in steps.iter_mut().zip(given) {
-            if step.answer == Answer::Outside {
-                continue;
-            }
             let target = step.wanted_force_n();
             let error_n = length(std::array::from_fn(|axis| {
                 if axis < first_axis {
