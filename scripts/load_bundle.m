@@ -40,12 +40,12 @@ function bundle = loaded(folder)
     currents = columns_of(files.currents_csv, 'currents.csv');
     bundle.currents_a = currents.current_a;
     map = read_npz(fullfile(folder, 'map.npz'));
-    check(map, bundle);
     bundle.map = map;
     bundle.lambda_n_per_m = [];
     if isfield(map, 'lambda_n_per_m')
         bundle.lambda_n_per_m = map.lambda_n_per_m;
     end
+    check(map, bundle);
     bundle.force_per_ampere = @(points_m) force_per_ampere(map, points_m);
     bundle.force_vectors_per_ampere = @(points_m) force_vectors_per_ampere(map, points_m);
     bundle.requested_force = @(points_m) requested_force(map, points_m);
@@ -151,10 +151,10 @@ end
 
 function found = height(map, points_m)
 % The surface's height, m, bilinear between the bundle's points; NaN where there is none.
-    found = NaN(size(points_m, 1), 1);
-    if isfield(map, 'height_m')
-        found = on_surface(map, map.height_m, points_m);
+    if ~isfield(map, 'height_m')
+        error('fluxform:bundle', 'map.npz holds no heights, as before schema 1.2: calibrate again');
     end
+    found = on_surface(map, map.height_m, points_m);
 end
 
 function found = on_surface(map, values, points_m)
@@ -1118,6 +1118,14 @@ end
 
 function check(map, bundle)
 % Whether the arrays fit each other.
+    if numel(map.schema_version) ~= 3 || map.schema_version(1) ~= 1
+        error('fluxform:bundle', 'map.npz: schema_version is not one that this loader reads');
+    end
+    stated = bundle.manifest.lambda.lambda_n_per_m;
+    own = bundle.lambda_n_per_m;
+    if numel(stated) ~= numel(own) || any(abs(own - stated) > 1e-12 * abs(own))
+        error('fluxform:bundle', 'map.npz and manifest.json state different lambda_n_per_m');
+    end
     coils = numel(map.current_max_a);
     if numel(bundle.currents_a) ~= coils
         error('fluxform:bundle', 'currents.csv must have one row a coil');
@@ -1170,6 +1178,9 @@ function check(map, bundle)
         error('fluxform:bundle', 'map.npz: robust_setting must hold a price above 0 and nothing below 0');
     end
     if isfield(map, 'height_m')
+        if ~all(isfield(map, {'static_current_a', 'inductance_h'}))
+            error('fluxform:bundle', 'map.npz: height_m needs static_current_a and inductance_h');
+        end
         if ~isfield(map, 'has_height') || ~all(map.has_height(:) == 0 | map.has_height(:) == 1)
             error('fluxform:bundle', 'map.npz: has_height must hold 0 or 1');
         end

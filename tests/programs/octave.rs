@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use fluxform::bundle::load::Bundle;
+use fluxform::bundle::npz::to_npz;
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::Renderer;
 use rayon::prelude::*;
@@ -21,6 +22,8 @@ pub fn trials() -> Vec<Trial> {
             octave_reads_the_tables_and_the_json_files_by_its_own_functions,
             a_loaded_map_goes_into_a_mat_file,
             a_changed_file_is_refused,
+            regression_an_unknown_height_was_a_force_of_zero,
+            regression_another_schema_and_another_lambda_were_read,
         ],
     }
 }
@@ -237,6 +240,60 @@ fn a_loaded_map_goes_into_a_mat_file() {
     sample(false, [5, 4, 3]).write(&target, false).unwrap();
     let output = octave(folder.path(), KEPT);
     assert_eq!(rows(&output), [vec![1.0], vec![3.0, 3.0, 4.0, 5.0]]);
+}
+
+/// What Octave says of a script that fails.
+fn refusal(folder: &Path, script: &str) -> String {
+    let script = format!("addpath(getenv('FLUXFORM_SCRIPTS')); {script}");
+    let output = octave(folder, &script);
+    assert!(!output.status.success(), "{script}: {output:?}");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn regression_an_unknown_height_was_a_force_of_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("bundle");
+    let older = sample(false, [4, 3, 2]).without_rendering();
+    older.write(&target, false).unwrap();
+    for asked in [
+        "currents([0 0 0])",
+        "height([0 0])",
+        "requested_force([0 0])",
+    ] {
+        let message = refusal(
+            folder.path(),
+            &format!("b = load_bundle('bundle'); b.{asked}"),
+        );
+        assert!(message.contains("holds no heights"), "{asked}: {message}");
+    }
+}
+
+fn regression_another_schema_and_another_lambda_were_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("bundle");
+    sample(false, [4, 3, 2]).write(&target, false).unwrap();
+    let honest = fs::read(target.join("map.npz")).unwrap();
+    let load = |of: &str, message: &str| {
+        let said = refusal(folder.path(), "load_bundle('bundle')");
+        assert!(said.contains(message), "{of}: {said}");
+    };
+    let bundle = Bundle::open(&target).unwrap();
+    let mut map = bundle.map.clone();
+    map.runtime.lambda_n_per_m = map.runtime.lambda_n_per_m.map(|lambda| 1.01 * lambda);
+    replace_map(&target, &to_npz(&map).unwrap());
+    load("lambda", "different lambda_n_per_m");
+    // The version's three numbers follow the header of its array.
+    let name = b"schema_version.npy";
+    let at = honest
+        .windows(name.len())
+        .position(|part| part == name)
+        .unwrap()
+        + name.len();
+    let at = at + honest[at..].iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    let mut changed = honest.clone();
+    changed[at] = 2;
+    replace_map(&target, &changed);
+    load("schema", "schema_version is not one");
 }
 
 fn a_changed_file_is_refused() {

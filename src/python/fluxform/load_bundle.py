@@ -34,11 +34,11 @@ REQUIRED = ("map.npz", "points.csv", "currents.csv", "lambda.json")
 CHUNK_POINTS = 4096
 # Of map.npz only these arrays are read.
 ARRAYS = (
-    "x_m", "y_m", "z_m", "coil", "gz_t_per_m_per_a", "moment_a_m2", "current_min_a",
+    "schema_version", "x_m", "y_m", "z_m", "coil", "gz_t_per_m_per_a", "moment_a_m2", "current_min_a",
     "current_max_a", "resistance_ohm",
 )
 OPTIONAL_ARRAYS = (
-    "schema_version", "gx_t_per_m_per_a", "gy_t_per_m_per_a", "requested_direction", "sideways_weight",
+    "gx_t_per_m_per_a", "gy_t_per_m_per_a", "requested_direction", "sideways_weight",
     "robust_setting",
     "gradient_t_per_m_per_a", "field_t_per_a", "passive_force_n",
     "working_point_gz_t_per_m", "total_current_max_a", "lambda_n_per_m", "height_x_m",
@@ -733,8 +733,8 @@ def _arrays(content):
     for name in ARRAYS:
         if name not in arrays:
             raise BundleError(f"map.npz: array {name} is missing")
-    version = arrays.get("schema_version")
-    if version is not None and (version.shape != (3,) or version[0] != SCHEMA_MAJOR):
+    version = arrays["schema_version"]
+    if version.shape != (3,) or version[0] != SCHEMA_MAJOR:
         raise BundleError("map.npz: schema_version is not one that this loader reads")
     return arrays
 
