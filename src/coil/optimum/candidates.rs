@@ -8,6 +8,7 @@ use super::outcome::{
 };
 use super::problem::{LimitName, Problem};
 use super::search;
+use super::sqp::ACTIVE;
 
 /// Share of the best force that a listed coil may lack.
 pub const SHARE: f64 = 0.01;
@@ -88,7 +89,7 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<BestCoil> {
             )
         })
         .map(|(row, bound)| {
-            let active = point.rows[row].abs() <= 1e-9;
+            let active = point.rows[row].abs() <= ACTIVE;
             LimitUse::new(
                 bound.name,
                 rated.values[row].value,

@@ -82,10 +82,10 @@ pub struct LimitUse {
     pub limit: f64,
     /// Whether the value respects it, but for a rounding.
     pub met: bool,
-    /// Whether it holds the optimum back.
+    /// Whether the optimum lies on it.
     pub active: bool,
-    /// d|force|/d(limit), N per SI unit; negative for lower limits. With whole turns that of the
-    /// coil whose turns need not be whole.
+    /// d|force|/d(limit) as this limit alone is relaxed, N per SI unit; negative for lower limits, 0 where others hold
+    /// the optimum back as well. With whole turns that of the coil whose turns need not be whole.
     pub sensitivity_n_per_unit: f64,
 }
 

@@ -11,7 +11,7 @@ use super::outcome::{
     BestCoil, Certificate, CertificateKind, LimitUse, OptimumStatus, Outcome, WireOutcome,
 };
 use super::problem::{LimitName, Problem, Task};
-use super::sqp::{self, FEASIBLE, Local};
+use super::sqp::{self, ACTIVE, FEASIBLE, Local};
 use super::starts;
 use super::surrogate;
 use fluxform_base::progress::{Interrupted, Progress};
@@ -396,22 +396,30 @@ pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
     let problem = &solved.problem;
     let window = diagnosis::snapped(problem, local);
     let rated = problem.rate(window)?;
-    let strongest = local
-        .multipliers
-        .iter()
-        .fold(0.0_f64, |s, v| s.max(v.abs()));
+    // Also of limits that hold the coil back together, of which one alone would do.
+    let is_active = |row: usize| {
+        local.point.rows[row].abs() <= ACTIVE || problem.bounds[row].name.is_equality()
+    };
+    let active: Vec<usize> = (0..problem.bounds.len())
+        .filter(|row| is_active(*row))
+        .collect();
     let limits = problem
         .bounds
         .iter()
         .enumerate()
         .filter(|(_, bound)| bound.name != LimitName::Axis)
         .map(|(row, bound)| {
-            let multiplier = local.multipliers[row];
+            let alone = local.point.least_multiplier(row, &active, problem);
+            let multiplier = if bound.name.is_equality() {
+                local.multipliers[row]
+            } else {
+                alone.unwrap_or(local.multipliers[row])
+            };
             LimitUse::new(
                 bound.name,
                 rated.values[row].value,
                 bound.limit,
-                multiplier.abs() > 1e-9 * strongest || bound.name.is_equality(),
+                is_active(row),
                 problem.sensitivity_n_per_unit(row, multiplier, &rated),
             )
         })

@@ -5,7 +5,7 @@
 //! three unknowns each step's quadratic programme is solved exactly. argmin does the searches in
 //! one variable (`wound`, `near_optimal_bore`).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use fluxform_numerics::small_quadratic::{Row, minimise};
 use fluxform_numerics::vec3::dot;
@@ -21,6 +21,51 @@ pub struct Point {
     pub rows: Vec<f64>,
     /// Their slopes.
     pub normals: Vec<[f64; 3]>,
+}
+
+impl Point {
+    /// Of an optimum that row `row` limits among the rows `active`, the least multiplier of that row: where rows depend
+    /// on each other multipliers are many, and to move this row alone is worth the least. `None` where no rows balance
+    /// the slope.
+    #[must_use]
+    pub fn least_multiplier(
+        &self,
+        row: usize,
+        active: &[usize],
+        problem: &dyn Smooth,
+    ) -> Option<f64> {
+        let slope = Vector3::from(self.slope);
+        let mut least: Option<f64> = None;
+        // Of all sets of at most three rows, those that are independent and push the right way.
+        for set in 1_u32..1 << active.len().min(MOST_ACTIVE) {
+            let rows: Vec<usize> = (0..active.len())
+                .filter(|at| set >> at & 1 == 1)
+                .map(|at| active[at])
+                .collect();
+            if rows.len() > 3 {
+                continue;
+            }
+            let normals = DMatrix::from_fn(3, rows.len(), |i, k| self.normals[rows[k]][i]);
+            let svd = normals.clone().svd(true, true);
+            let independent = INDEPENDENT * normals.norm();
+            if svd.rank(independent) < rows.len() {
+                continue;
+            }
+            let Ok(found) = svd.solve(&-slope, 0.0) else {
+                continue;
+            };
+            let left = (&normals * &found + slope).norm();
+            let strongest = found.amax();
+            let pushes =
+                |k: usize| found[k] >= -BALANCED * strongest || problem.is_equality(rows[k]);
+            if left <= BALANCED * slope.norm() && (0..rows.len()).all(pushes) {
+                let own = rows.iter().position(|other| *other == row);
+                let own = own.map_or(0.0, |k| found[k].max(0.0));
+                least = Some(least.map_or(own, |least| least.min(own)));
+            }
+        }
+        least
+    }
 }
 
 /// A smooth problem in three scaled variables of order one.
@@ -52,6 +97,14 @@ const LONGEST: f64 = 1.0;
 const SHORTEST: f64 = 1e-10;
 /// Rows above this are not met.
 pub(crate) const FEASIBLE: f64 = 1e-10;
+/// Rows whose sets are tried for the least multipliers.
+const MOST_ACTIVE: usize = 8;
+/// Normals are independent above this share of their size.
+const INDEPENDENT: f64 = 1e-6;
+/// How far a slope may be from the rows that balance it, relative.
+const BALANCED: f64 = 1e-6;
+/// A row this close to its limit is active.
+pub(super) const ACTIVE: f64 = 1e-9;
 /// Shares of a row's violation that a step is to remove, in turn.
 const REMOVE: [f64; 4] = [1.0, 0.5, 0.1, 0.0];
 

@@ -233,6 +233,35 @@ fn the_seed_problem_is_solved_and_proven() {
 }
 
 #[test]
+fn regression_of_two_limits_that_coincide_one_was_worth_what_both_are() {
+    // 24 W at 2 A are 6 ohm.
+    let limits = |ohm, power_w| Limits {
+        resistance_max_ohm: Some(ohm),
+        power_max_w: Some(power_w),
+        settling_max_s: None,
+        ..seed_limits()
+    };
+    let best = |limits| solved(&task(limits, Some(36.0))).best.expect("optimal");
+    let coincident = best(limits(6.0, 24.0));
+    for name in [LimitName::Resistance, LimitName::Power] {
+        let used = coincident.limits.iter().find(|used| used.name == name);
+        let used = used.expect("bounded");
+        assert!(
+            used.active && used.sensitivity_n_per_unit == 0.0,
+            "{used:?}"
+        );
+    }
+    for wider in [limits(6.01, 24.0), limits(6.0, 24.04)] {
+        assert!((best(wider).force_n / coincident.force_n - 1.0).abs() < 1e-9);
+    }
+    let outer = coincident
+        .limits
+        .iter()
+        .find(|used| used.name == LimitName::OuterDiameter);
+    assert!(outer.expect("bounded").sensitivity_n_per_unit > 0.0);
+}
+
+#[test]
 fn sensitivities_are_what_a_wider_limit_gives() {
     let base = solved(&task(seed_limits(), Some(36.0)))
         .best

@@ -82,14 +82,20 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
             &format!("cost {} of the force", percent(lost.max(0.0))),
         );
     }
-    let held: Vec<String> = result
-        .limits
-        .iter()
-        .chain(&result.bounds)
-        .map(|(_, used)| used)
-        .filter(|used| used.active && used.sensitivity_n_per_unit != 0.0)
-        .map(sensitivity)
-        .collect();
+    // A dimension that is given cannot move to its limit.
+    let movable = result.limits.iter().chain(&result.bounds);
+    let movable = movable.filter(|(key, used)| used.active && !result.fixed.contains_key(*key));
+    let active: Vec<&LimitUse> = movable.map(|(_, used)| used).collect();
+    let (worth, shared): (Vec<&LimitUse>, Vec<&LimitUse>) =
+        (active.into_iter()).partition(|used| used.sensitivity_n_per_unit != 0.0);
+    let mut held: Vec<String> = worth.into_iter().map(sensitivity).collect();
+    if shared.len() > 1 {
+        let labels: Vec<&str> = shared.iter().map(|used| used.name.limit().label).collect();
+        held.push(format!(
+            "{}: one alone gives nothing more",
+            labels.join(", ")
+        ));
+    }
     if !held.is_empty() {
         sheet.line("worth", &held.join("\n"));
     }
