@@ -7,14 +7,13 @@
     python3 scripts/mutants.py --survivors      # only those in mutants_survivors.csv
 
 `cargo mutants --list` names every mutant. A sample of each room, drawn with a fixed seed and
-spread evenly over its files, is planted into a copy of the tree, all at once, each behind a switch
+spread evenly over its files, is planted into a copy of the workspace, all at once, each behind a switch
 that an environment variable turns. So one build serves all: rebuilding the library for each would
 take minutes a mutant. An operator changes where it stands in the syntax tree, hence `a - b * c`
 becomes `a - (b + c)`. Each mutant meets the tests that reach it, the quickest first, until one fails;
 a limit on processor time, not on the clock, tells one that never ends.
 
-The copy holds the rooms alone, without commands and bundles: tests that need those are not asked,
-and the program's own checks from end to end may catch what is listed here as surviving.
+Asked are the rooms' own tests: those of commands and bundles may catch what is listed here as surviving.
 """
 
 import argparse
@@ -31,15 +30,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 
 import tree_sitter
 import tree_sitter_rust
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROOMS = ["numerics", "field", "coil", "lambda", "shape"]
-KEPT = ["accuracy", "progress", "units", "numerics", "design", "field", "coil", "map", "shape", "lambda"]
-TESTS = ["air_coil", "bh_curve", "core_field", "harmonic", "lambda", "magnet", "passive",
-         "shape", "steel", "steel_saturated", "transient"]
 TABLE = ROOT / "results/bench/mutants.csv"
 SURVIVORS = ROOT / "results/bench/mutants_survivors.csv"
 # A test that takes longer than this is asked only by the whole suite, seconds of processor time.
@@ -79,7 +76,7 @@ fn slow(id: u32) -> bool {
 
 def listed(room):
     """Every mutant of a room, with a name that outlives shifted lines: words and how many alike precede."""
-    text = subprocess.run(["cargo", "mutants", "--list", "--json", "--file", f"src/{room}/**"],
+    text = subprocess.run(["cargo", "mutants", "--list", "--json", "--package", f"fluxform-{room}"],
                           cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
     alike = collections.Counter()
     mutants = []
@@ -216,26 +213,20 @@ class Planter:
 
 
 def copied(work):
-    """The rooms and their tests without what stands above them."""
+    """The workspace, with the switch in every room."""
     tree = work / "tree"
     shutil.rmtree(tree, ignore_errors=True)
-    tree.mkdir(parents=True)
     names = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True,
                            stdout=subprocess.PIPE, text=True).stdout.split("\n")
     for name in filter(None, names):
-        parts = pathlib.PurePath(name).parts
-        if parts[0] == "src" and len(parts) > 2 and parts[1] not in KEPT or name == "src/main.rs":
-            continue
         if (ROOT / name).is_file():
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, tree / name)
-    manifest = (tree / "Cargo.toml").read_text()
-    manifest = re.sub(r"\[\[(bin|bench)\]\]\n(?:[^\[\n].*\n|\n)*", "", manifest)
-    (tree / "Cargo.toml").write_text(manifest + '\n[workspace]\n')
-    (tree / "src/planted.rs").write_text(SWITCH)
-    library = (tree / "src/lib.rs").read_text()
-    library = re.sub(r"pub mod (\w+);\n", lambda m: m[0] if m[1] in KEPT else "", library)
-    (tree / "src/lib.rs").write_text(library + "\npub mod planted;\n")
+    for room in ROOMS:
+        folder = tree / "src" / room
+        (folder / "planted.rs").write_text(SWITCH)
+        with (folder / "lib.rs").open("a") as library:
+            library.write("\npub mod planted;\n")
     return tree
 
 
@@ -256,11 +247,10 @@ def write_planted(tree, numbered, out):
             (tree / name).write_text(text)
 
 
-def cargo(tree, arguments):
-    environment = dict(os.environ, CARGO_PROFILE_DEV_OPT_LEVEL="1", CARGO_PROFILE_DEV_DEBUG="0",
-                       CARGO_INCREMENTAL="1")
-    environment.setdefault("CARGO_TARGET_DIR", str(tree.parent / "target"))
-    run = subprocess.run(["cargo", *arguments, "--locked", "--message-format=json"], cwd=tree,
+def cargo(tree, *arguments):
+    environment = dict(os.environ, CARGO_PROFILE_DEV_DEBUG="0", CARGO_TARGET_DIR=str(tree.parent / "target"))
+    rooms = [f"--package=fluxform-{room}" for room in ROOMS]
+    run = subprocess.run(["cargo", *arguments, *rooms, "--locked", "--message-format=json"], cwd=tree,
                          env=environment, stdout=subprocess.PIPE, text=True)
     return run.returncode, [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
 
@@ -270,7 +260,7 @@ def planted_without_errors(tree, numbered):
     out = {}
     while True:
         write_planted(tree, numbered, out)
-        code, messages = cargo(tree, ["test", "--no-run", "--lib"])
+        code, messages = cargo(tree, "check")
         if code == 0:
             return out
         before = len(out)
@@ -306,13 +296,14 @@ def planted_without_errors(tree, numbered):
 
 
 def built(work, numbered):
-    """The copied tree, what could not be planted into it, and its test programs."""
+    """What could not be planted, and the rooms' test programs with the folders they run in."""
     tree = copied(work)
     out = planted_without_errors(tree, numbered)
-    code, messages = cargo(tree, ["test", "--no-run", "--lib", *(f"--test={t}" for t in TESTS)])
+    code, messages = cargo(tree, "test", "--no-run")
     if code != 0:
         sys.exit("\n".join(m["message"]["rendered"] for m in messages if m["reason"] == "compiler-message")[:4000])
-    return tree, out, [m["executable"] for m in messages if m["reason"] == "compiler-artifact" and m.get("executable")]
+    return out, [(m["executable"], pathlib.Path(m["manifest_path"]).parent) for m in messages
+                 if m["reason"] == "compiler-artifact" and m.get("executable")]
 
 
 def limited(seconds):
@@ -322,62 +313,54 @@ def limited(seconds):
     return limit
 
 
-def run_test(tree, binary, name, seconds, **variables):
+def run(test, seconds, **variables):
     """Exit code and processor time of one test by itself."""
-    environment = dict(os.environ, RAYON_NUM_THREADS="1", RUST_BACKTRACE="0", CARGO_MANIFEST_DIR=str(tree), **variables)
-    process = subprocess.Popen([binary, "--exact", name, "--test-threads=1", "-q"], cwd=tree, env=environment,
+    program, folder, name = test
+    environment = dict(os.environ, RAYON_NUM_THREADS="1", RUST_BACKTRACE="0", CARGO_MANIFEST_DIR=str(folder), **variables)
+    process = subprocess.Popen([program, "--exact", name, "--test-threads=1", "-q"], cwd=folder, env=environment,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=limited(seconds))
-    try:
-        process.wait(timeout=20 * seconds + 60)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    return process.returncode
+    watch = threading.Timer(20 * seconds + 60, process.kill)
+    watch.start()
+    _, status, used = os.wait4(process.pid, 0)
+    watch.cancel()
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, used.ru_utime + used.ru_stime
 
 
-def reached(tree, binaries, jobs):
+def reached(programs, jobs):
     """For each mutant, the tests that reach it, the quickest first."""
     tests = []
-    for binary in binaries:
-        text = subprocess.run([binary, "--list"], cwd=tree, check=True, stdout=subprocess.PIPE, text=True).stdout
-        ignored = subprocess.run([binary, "--list", "--ignored"], cwd=tree, check=True, stdout=subprocess.PIPE, text=True).stdout
-        names = lambda t: {line[:-6] for line in t.splitlines() if line.endswith(": test")}
-        tests += [(binary, name) for name in sorted(names(text) - names(ignored))]
+    for program, folder in programs:
+        def names(*which):
+            text = subprocess.run([program, "--list", *which], cwd=folder, check=True, stdout=subprocess.PIPE, text=True)
+            return {line[:-6] for line in text.stdout.splitlines() if line.endswith(": test")}
+        tests += [(program, folder, name) for name in sorted(names() - names("--ignored"))]
 
     def ask(test):
-        with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder, "reached")
-            path.touch()
-            used = os.path.join(folder, "time")
-            script = 'import os,resource,subprocess,sys;r=subprocess.call(sys.argv[2:],stdout=-3,stderr=-3);' \
-                     'u=resource.getrusage(resource.RUSAGE_CHILDREN);open(sys.argv[1],"w").write(str(u.ru_utime+u.ru_stime));sys.exit(r)'
-            code = subprocess.run([sys.executable, "-c", script, used, test[0], "--exact", test[1], "--test-threads=1"],
-                                  cwd=tree, preexec_fn=limited(LONGEST_S),
-                                  env=dict(os.environ, RAYON_NUM_THREADS="1", MUTANT_REACHED=str(path),
-                                           CARGO_MANIFEST_DIR=str(tree))).returncode
-            seconds = float(open(used).read()) if os.path.exists(used) else LONGEST_S
-            return test, code, seconds, {int(n) for n in path.read_text().split()}
+        with tempfile.NamedTemporaryFile("r") as file:
+            code, seconds = run(test, LONGEST_S, MUTANT_REACHED=file.name)
+            return test, code, seconds, {int(n) for n in file.read().split()}
 
     found = collections.defaultdict(list)
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for test, code, seconds, numbers in pool.map(ask, tests):
             if code != 0 or seconds >= LONGEST_S:
-                print(f"  not asked: {os.path.basename(test[0])} {test[1]} (exit {code}, {seconds:.0f} s)", file=sys.stderr)
+                print(f"  not asked: {os.path.basename(test[0])} {test[2]} (exit {code}, {seconds:.0f} s)", file=sys.stderr)
                 continue
             for number in numbers:
-                found[number].append((seconds, *test))
+                found[number].append((seconds, test))
     print(f"  {len(tests)} tests", file=sys.stderr)
     return {number: sorted(tests) for number, tests in found.items()}
 
 
-def judge(tree, number, tests):
+def judge(number, tests):
     """What became of a mutant, and the test that caught it."""
-    for seconds, binary, name in tests:
-        code = run_test(tree, binary, name, 5 + 5 * seconds, MUTANT=str(number))
+    for seconds, test in tests:
+        code, _ = run(test, 5 + 5 * seconds, MUTANT=str(number))
         if code in (-24, -9):
-            return "timeout", name
+            return "timeout", test[2]
         if code != 0:
-            return "caught", name
+            return "caught", test[2]
     return ("survived", f"{len(tests)} tests reach it") if tests else ("survived", "no test reaches it")
 
 
@@ -404,12 +387,12 @@ def main():
             print(f"{mutant['file']}:{mutant['line']}: {mutant['words']}")
         return
     work = options.work.resolve()
-    tree, out, binaries = built(work, numbered)
-    reach = reached(tree, binaries, options.jobs)
+    out, programs = built(work, numbered)
+    reach = reached(programs, options.jobs)
     verdicts = {number: (why, "") for number, why in out.items()}
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         rest = [n for n in numbered if n not in out]
-        for number, verdict in zip(rest, pool.map(lambda n: judge(tree, n, reach.get(n, [])), rest)):
+        for number, verdict in zip(rest, pool.map(lambda n: judge(n, reach.get(n, [])), rest)):
             verdicts[number] = verdict
             mutant = numbered[number]
             print(f"{mutant['room']:8} {verdict[0]:9} {mutant['file']}:{mutant['line']}: {mutant['words']} [{verdict[1]}]", flush=True)

@@ -262,6 +262,8 @@ mod tests {
         };
         assert_eq!(seated(&[part, low]), seated(&[part]));
         assert!((seated(&[part, low]).apply([0.0, 0.0, 1.3])[2] - 0.02).abs() < 1e-15);
+        let [x, y, _] = seated(&[part]).apply([5.7, 4.3, 0.0]);
+        assert!(x.abs() < 1e-15 && y.abs() < 1e-15, "{x} {y}");
         // Without any area there is nothing to seat.
         assert_eq!(seated(&[low]), Transform::new(1e-3, &placement));
     }

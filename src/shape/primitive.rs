@@ -254,6 +254,41 @@ mod tests {
     }
 
     #[test]
+    fn the_box_is_the_smallest_around_the_surface() {
+        for (primitive, low_m, high_m) in [
+            (FLAT, 0.05, 0.05),
+            (HALF_SPHERE, 0.03, 0.08),
+            (HALF_CYLINDER, 0.03, 0.08),
+            (WEDGE, 0.03, 0.08),
+        ] {
+            let shape = placed(primitive, [0.3, -0.2, 0.011], 30.0);
+            let bounds = shape.bounds();
+            assert!(
+                (bounds.min_m[2] - low_m - 0.011).abs() < 1e-15,
+                "{primitive:?}"
+            );
+            assert!(
+                (bounds.max_m[2] - high_m - 0.011).abs() < 1e-15,
+                "{primitive:?}"
+            );
+            let reach = match primitive {
+                Primitive::HalfSphere { .. } => 0.05,
+                _ => 0.05 * (0.5 + 0.75_f64.sqrt()),
+            };
+            for (axis, middle) in [0.3, -0.2].into_iter().enumerate() {
+                assert!(
+                    (bounds.max_m[axis] - middle - reach).abs() < 1e-15,
+                    "{primitive:?}"
+                );
+                assert!(
+                    (middle - bounds.min_m[axis] - reach).abs() < 1e-15,
+                    "{primitive:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn heights_are_the_seeds() {
         let at = |p: Primitive, x: f64, y: f64| placed(p, [0.0; 3], 0.0).sample(x, y).unwrap();
         assert_eq!(at(FLAT, 0.013, -0.05).height_m, 0.05);

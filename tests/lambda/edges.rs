@@ -1,7 +1,7 @@
 //! Degenerate problems with closed answers, criteria, refusals.
 
 use fluxform_lambda::worst::{felt, worst_point};
-use fluxform_lambda::{Criterion, Settings, Solution, Status, solve};
+use fluxform_lambda::{Criterion, Settings, Solution, Status, relative_error, solve};
 
 use fluxform_testing::force_problems::{Case, small_case};
 
@@ -167,6 +167,14 @@ fn the_criterion_chooses() {
         let at = solution.at.expect("requested");
         assert_eq!(at.lambda_n_per_m, 2.3);
         assert!((at.rms_error_n.powi(2) - solution.path.error_n2(2.3)).abs() < 1e-18);
+        let rms_height_m = ((0.05_f64.powi(2) + 0.03_f64.powi(2) + 0.04_f64.powi(2)) / 3.0).sqrt();
+        let relative = at.rms_error_n / (2.3 * rms_height_m);
+        for found in [
+            at.relative_rms_error,
+            relative_error(&case.problem(), 2.3).expect("well formed"),
+        ] {
+            assert!((found.expect("requested") / relative - 1.0).abs() < 1e-14);
+        }
     }
     let strict = Settings {
         jnd_weight: 0.0,
