@@ -309,6 +309,13 @@ pub struct FieldLeft {
     /// The sensor's noise as stated, T.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_t: Option<f64>,
+    /// Where it is not stated: the noise estimated from what the fit leaves of the field, T.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimated_noise_t: Option<f64>,
+    /// After the fit and with stated noise: sum of the squares in units of that noise over the field's degrees
+    /// of freedom.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced_chi_square: Option<f64>,
 }
 
 /// Residuals of the measured gradient.
@@ -327,6 +334,13 @@ pub struct GradientLeft {
     /// The sensor's noise as stated, T/m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_t_per_m: Option<f64>,
+    /// Where it is not stated: the noise estimated from what the fit leaves of the gradient, T/m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimated_noise_t_per_m: Option<f64>,
+    /// After the fit and with stated noise: sum of the squares in units of that noise over the gradient's
+    /// degrees of freedom.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced_chi_square: Option<f64>,
 }
 
 /// A value of the scan.
@@ -369,8 +383,8 @@ pub struct FitFile {
     pub cutoff: f64,
     /// Measured numbers minus fitted directions.
     pub degrees_of_freedom: usize,
-    /// Sum of the squares in units of the stated noise over the degrees of freedom: 1 where noise is
-    /// all that is left.
+    /// Sum of the squares in units of the stated noise over the degrees of freedom, of what noise is
+    /// stated for: 1 where noise is all that is left.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduced_chi_square: Option<f64>,
     /// Linearisations.

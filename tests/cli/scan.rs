@@ -17,6 +17,7 @@ struct Made {
     turn_deg: [f64; 3],
     background_t: [f64; 3],
     noise_t: f64,
+    gradient_noise_t_per_m: f64,
     seed: u64,
     /// Of the program that makes the scan.
     options: &'static [&'static str],
@@ -44,6 +45,7 @@ impl Made {
             turn_deg: [0.0; 3],
             background_t: [0.0; 3],
             noise_t: 0.0,
+            gradient_noise_t_per_m: 0.0,
             seed: 7,
             options: &[],
         }
@@ -87,7 +89,8 @@ impl Made {
                     assert!(axis.is_some() || self.turn_deg == [0.0; 3]);
                     let value = axis.map_or_else(|| per_a(column), |axis| seen[axis]);
                     let background = axis.map_or(0.0, |axis| self.background_t[axis]);
-                    let value = 1.3 * gain * value + background + self.noise_t * noise.normal();
+                    let size = axis.map_or(self.gradient_noise_t_per_m, |_| self.noise_t);
+                    let value = 1.3 * gain * value + background + size * noise.normal();
                     scan.push_str(&format!(",{value}"));
                 }
                 scan.push('\n');
@@ -272,6 +275,89 @@ fn gradients_count_and_an_upright_sensor_is_not_turned() {
     // Only the background that was measured.
     assert!(report_text["fit"]["background_t"][0].is_null());
     assert!(report_text["fit"]["background_t"][2].is_number());
+}
+
+/// One chi-square for both kinds once made errors of the background three times too small where the field
+/// was noisy, and those of the position where the gradient was.
+#[test]
+fn field_and_gradient_have_a_noise_of_their_own() {
+    let place = Place::new();
+    let columns = ["bz_t", "dbz_dz_t_per_m", "dbx_dz_t_per_m", "dby_dz_t_per_m"];
+    let mut made = Made::new(&columns, &[(4, 1.0), (3, 0.95)]);
+    made.shift_m = [-0.0003, 0.0008, -0.0006];
+    made.background_t[2] = 4.1e-5;
+    let all = ["--noise-t", "3e-5", "--noise-t-per-m", "1e-5"];
+    // A noisy field beside good gradients, and the other way round.
+    for (noises, all) in [
+        ([3e-5, 1e-5], all),
+        ([1e-7, 1e-3], [all[0], "1e-7", all[2], "1e-3"]),
+    ] {
+        [made.noise_t, made.gradient_noise_t_per_m] = noises;
+        let options = [&[], &all[..2], &all[2..], &all[..]];
+        let mut squares = [[0.0; 2]; 4];
+        for seed in 0..12 {
+            made.seed = seed;
+            made.write(&place, "scan.csv", &grid());
+            for (options, [level, shift]) in options.into_iter().zip(&mut squares) {
+                let compared = compare(&place, "scan.csv", options);
+                let fit = &compared["fit"];
+                let off = |key: &str, axis: usize, truth: f64| {
+                    let error = &fit[key.replace('_', "_error_")][axis];
+                    let off = fit[key][axis].as_f64().unwrap() - truth;
+                    (off / error.as_f64().unwrap()).powi(2)
+                };
+                *level += off("background_t", 2, made.background_t[2]) / 12.0;
+                for (axis, truth) in made.shift_m.into_iter().enumerate() {
+                    *shift += off("position_m", axis, truth) / 36.0;
+                }
+                for (k, (of, unit)) in [("field", "t"), ("gradient", "t_per_m")].iter().enumerate()
+                {
+                    let left = &compared["residuals"]["fitted"][of];
+                    let stated = left[format!("noise_{unit}")].as_f64();
+                    let estimated = left[format!("estimated_noise_{unit}")].as_f64();
+                    assert_eq!(stated.is_some(), options.contains(&all[2 * k]), "{left}");
+                    assert_ne!(stated.is_some(), estimated.is_some(), "{left}");
+                    let ratio = stated.or(estimated).unwrap() / noises[k];
+                    assert!((0.7..1.4).contains(&ratio), "{options:?}: {left}");
+                }
+            }
+        }
+        for (options, squares) in options.into_iter().zip(squares) {
+            let rms = squares.map(f64::sqrt);
+            let near_one = rms.iter().all(|rms| (0.6..1.5).contains(rms));
+            assert!(near_one, "{noises:?} {options:?}: {rms:?}");
+        }
+    }
+    let human = place.run(&["probe", SEED, "--compare", "scan.csv", all[0], "1e-7"]);
+    let human = human.ends(0).out;
+    for text in [
+        "stated noise 100 nT",
+        "estimated noise",
+        "field: the stated",
+    ] {
+        assert!(human.contains(text), "{text}: {human}");
+    }
+}
+
+/// Three field values do not say how noisy they are.
+#[test]
+fn a_kind_with_too_few_values_shares_the_other_ones_noise() {
+    let place = Place::new();
+    let columns = ["bz_t", "dbz_dz_t_per_m", "dbx_dz_t_per_m"];
+    let mut made = Made::new(&columns, &[(4, 1.0)]);
+    made.gradient_noise_t_per_m = 1e-4;
+    made.write(&place, "scan.csv", &grid()[..3]);
+    for (option, given) in [(&[][..], false), (&["--noise-t-per-m", "1e-4"], true)] {
+        let compared = compare(&place, "scan.csv", option);
+        let warning = compared["warnings"][0].as_str().unwrap();
+        assert!(warning.contains("too few field values"), "{warning}");
+        let fit = &compared["fit"];
+        assert_eq!(fit["reduced_chi_square"].is_number(), given);
+        assert!(
+            fit["background_error_t"][2].as_f64().unwrap() > 0.0,
+            "{fit:#}"
+        );
+    }
 }
 
 #[test]

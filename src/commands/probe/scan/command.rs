@@ -39,11 +39,11 @@ pub struct ScanFlags {
     #[arg(long, hide_short_help = true, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "compare",
           conflicts_with_all = OF_POINTS, default_values = ["scale", "background", "position"])]
     fit: Vec<What>,
-    /// The sensor's noise in tesla, where known: errors and residuals are held against it
+    /// The sensor's noise in tesla: field residuals are held against it; estimated from them where not given
     #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::noise, requires = "compare",
           conflicts_with_all = OF_POINTS)]
     noise_t: Option<f64>,
-    /// The noise of measured gradients in T/m
+    /// The noise of measured gradients in T/m, likewise
     #[arg(long, hide_short_help = true, value_name = "G", value_parser = values::noise, requires = "compare",
           conflicts_with_all = OF_POINTS)]
     noise_t_per_m: Option<f64>,
@@ -161,20 +161,7 @@ fn text(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
     if let (Some(values), Some(errors)) = (fit.background_t, fit.background_error_t) {
         sheet.line("background", &three(values, errors, 1e6, "uT"));
     }
-    if let Some(ratio) = fit.reduced_chi_square {
-        let verdict = if ratio > 2.0 {
-            "more is left than the stated noise"
-        } else {
-            "the stated noise is what is left"
-        };
-        sheet.line(
-            "noise",
-            &format!(
-                "{verdict}: chi-square {} a degree of freedom",
-                number_to(ratio, 3)
-            ),
-        );
-    }
+    noise_rows(&mut sheet, &file.residuals.fitted);
     for set in &fit.undetermined {
         let text = match &set[..] {
             [one] => format!("{one}: changes nothing at these points, not fitted"),
@@ -214,15 +201,42 @@ fn text(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
     sheet.finish()
 }
 
+/// What is left beside each stated noise.
+fn noise_rows(sheet: &mut Sheet, fitted: &Left) {
+    let field = fitted.field.as_ref().map(|f| f.reduced_chi_square);
+    let gradient = fitted.gradient.as_ref().map(|g| g.reduced_chi_square);
+    let both = field.is_some() && gradient.is_some();
+    for (kind, ratio) in [("field", field.flatten()), ("gradient", gradient.flatten())] {
+        let Some(ratio) = ratio else { continue };
+        let of = if both {
+            format!("{kind}: ")
+        } else {
+            String::new()
+        };
+        let verdict = if ratio > 2.0 {
+            "more is left than the stated noise"
+        } else {
+            "the stated noise is what is left"
+        };
+        let ratio = number_to(ratio, 3);
+        sheet.line(
+            "noise",
+            &format!("{of}{verdict}: chi-square {ratio} a degree of freedom"),
+        );
+    }
+}
+
 fn left(left: &Left) -> String {
     let mut lines = Vec::new();
     let mut line = |rms: String,
                     part: f64,
                     largest: String,
                     at: &ScanPlace,
-                    noise: Option<String>,
+                    [stated, estimated]: [Option<String>; 2],
                     model: String| {
-        let noise = noise.map_or_else(String::new, |noise| format!(", noise {noise}"));
+        let stated = stated.map(|noise| format!(", stated noise {noise}"));
+        let estimated = estimated.map(|noise| format!(", estimated noise {noise}"));
+        let noise = stated.or(estimated).unwrap_or_default();
         lines.push(format!(
             "rms {rms} ({} of the measured){noise}; largest {largest}, {} in line {}; computed to {model}",
             percent(part),
@@ -237,7 +251,7 @@ fn left(left: &Left) -> String {
             part(f.rms_t, f.measured_rms_t),
             si(f.largest_t, "T"),
             &f.at,
-            f.noise_t.map(|noise| si(noise, "T")),
+            [f.noise_t, f.estimated_noise_t].map(|noise| Some(si(noise?, "T"))),
             si(f.model_error_t, "T"),
         );
     }
@@ -247,7 +261,7 @@ fn left(left: &Left) -> String {
             part(g.rms_t_per_m, g.measured_rms_t_per_m),
             si(g.largest_t_per_m, "T/m"),
             &g.at,
-            g.noise_t_per_m.map(|noise| si(noise, "T/m")),
+            [g.noise_t_per_m, g.estimated_noise_t_per_m].map(|noise| Some(si(noise?, "T/m"))),
             si(g.model_error_t_per_m, "T/m"),
         );
     }

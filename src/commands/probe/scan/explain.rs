@@ -11,10 +11,10 @@
 
 use rayon::prelude::*;
 
+use super::Weighted;
 use super::fit::{self, Fitted, Parameter, parameters};
 use super::keys::{Key, keys};
 use super::model::{Model, Pose};
-use super::{ScanRequest, Weighted, noises};
 use crate::RunError;
 use crate::bundle::scan::{Explanation, Scan};
 use crate::design::Design;
@@ -62,7 +62,10 @@ pub(super) struct Task<'a> {
     pub model: &'a Model<'a>,
     pub scan: &'a Scan,
     pub residuals: &'a Weighted,
-    pub request: &'a ScanRequest,
+    /// Tolerance of the computed field; `None` for the default.
+    pub tolerance: Option<f64>,
+    /// Whether a noise is given.
+    pub noise_given: bool,
     /// The claimed relative error of the computed field.
     pub relative_error: f64,
     /// The size of the field, T.
@@ -176,7 +179,7 @@ impl Task<'_> {
             .saturating_sub(parameters)
             .max(1);
         let mean = left / freedom as f64;
-        if noises(self.scan, self.request).is_some() {
+        if self.noise_given {
             mean.max(1.0).sqrt()
         } else {
             mean.sqrt()
@@ -253,6 +256,7 @@ impl Task<'_> {
             parameters,
             weights,
             self.field_t,
+            None,
             self.progress,
         )?;
         if found.linear.rank == 0 {
@@ -329,7 +333,7 @@ impl Task<'_> {
     fn key(&self, key: &Key) -> Result<Option<Settled>, RunError> {
         let fine = Search {
             key,
-            tolerance: self.request.tolerance,
+            tolerance: self.tolerance,
         };
         let coarse = Search {
             key,

@@ -83,7 +83,9 @@ pub(super) fn parameters(fitted: Fitted, scan: &Scan, coils: usize) -> Vec<Param
 pub(super) struct Fit {
     /// One a parameter.
     pub(super) values: Vec<f64>,
-    /// The last linearisation, in steps of [`Parameter::step`].
+    /// The weighted columns of the last linearisation, in steps of [`Parameter::step`].
+    pub(super) columns: Vec<Vec<f64>>,
+    /// Its solution.
     pub(super) linear: Solution,
     /// The steps.
     pub(super) steps: Vec<f64>,
@@ -103,7 +105,8 @@ struct State {
     left: f64,
 }
 
-/// Fits `parameters`; `weights` are those of the measured numbers, `field_t` the size of the field.
+/// Fits `parameters`, from those of `before` where there is such a fit; `weights` are those of the measured
+/// numbers, `field_t` the size of the field.
 ///
 /// # Errors
 /// A scan on a winding's edge or the steel; interruption.
@@ -113,6 +116,7 @@ pub(super) fn fit(
     parameters: &[Parameter],
     weights: &[f64],
     field_t: f64,
+    before: Option<&Fit>,
     progress: &dyn Progress,
 ) -> Result<Fit, RunError> {
     let task = Task {
@@ -123,30 +127,32 @@ pub(super) fn fit(
         progress,
     };
     let steps: Vec<f64> = parameters.iter().map(|p| p.step(field_t)).collect();
-    let mut state = task.state(start(parameters))?;
+    let start = before.map_or_else(|| start(parameters), |fit| fit.values.clone());
+    let mut state = task.state(start)?;
     let measured: f64 = weighted_squares(&scan.values, weights);
     let (mut iterations, mut converged) = (0, false);
-    let linear = loop {
+    let (columns, linear) = loop {
         iterations += 1;
         let columns = task.columns(&state, &steps)?;
         let linear = least_squares::solve(&columns, &task.weighted_residuals(&state.given));
         let settled = linear.removed <= SETTLED * state.left + 1e-24 * measured;
         if settled || iterations == ITERATIONS {
             converged = settled;
-            break linear;
+            break (columns, linear);
         }
         match task.stepped(&state, &linear, &steps)? {
             Some(next) => state = next,
-            None => break linear,
+            None => break (columns, linear),
         }
     };
     Ok(Fit {
         values: state.values,
+        columns,
         linear,
         steps,
         fitted: state.given,
         left: state.left,
-        iterations,
+        iterations: iterations + before.map_or(0, |fit| fit.iterations),
         converged,
     })
 }

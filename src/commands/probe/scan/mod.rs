@@ -26,12 +26,14 @@ mod explain;
 mod fit;
 mod keys;
 mod model;
+mod noise;
 mod picture;
 pub(super) mod units;
 
 pub use fit::Fitted;
-use fit::{Fit, Parameter};
+use fit::Parameter;
 use model::{Model, Pose};
+use noise::{Noise, NoisyFit};
 
 /// Measured numbers that must be there beyond those fitted, so that an error can be estimated.
 const SPARE: usize = 3;
@@ -126,17 +128,20 @@ pub fn compare(
     if let Some(hint) = units::magnitudes(scan, &predicted) {
         return Err(refused(hint));
     }
-    let weighted = Weighted::of(scan, predicted, weights(scan, request));
-    let field_t = rms(scan, &scan.values, field).unwrap_or(1e-3).max(1e-9);
-    let weights = &weighted.weights;
-    let fit = fit::fit(&model, scan, &parameters, weights, field_t, progress)?;
+    let field_t = rms(scan, &scan.values, Kind::Field)
+        .unwrap_or(1e-3)
+        .max(1e-9);
+    let noisy = noise::fit(&model, scan, &parameters, request, field_t, progress)?;
+    // Explanations are held against the noise that the fit settled at.
+    let weighted = Weighted::of(scan, predicted, noisy.weights(scan));
     let relative_error = solved.point_error();
     let task = explain::Task {
         design,
         model: &model,
         scan,
         residuals: &weighted,
-        request,
+        tolerance: request.tolerance,
+        noise_given: noisy.given(),
         relative_error,
         field_t,
         progress,
@@ -146,11 +151,11 @@ pub fn compare(
 
     let report = ResidualReport {
         scan,
-        request,
+        noisy: &noisy,
         model_errors: model_errors(scan, &weighted.predicted, relative_error),
     };
-    let noise_known = noises(scan, request).is_some();
     let mut warnings: Vec<String> = curve_warning(&scene).into_iter().collect();
+    warnings.extend(noisy.warning());
     let file = ScanFile {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -161,9 +166,9 @@ pub fn compare(
         measured: scan.quantities.iter().map(|q| q.column()).collect(),
         residuals: Residuals {
             as_designed: report.left(&weighted.predicted),
-            fitted: report.left(&fit.fitted),
+            fitted: report.fitted(),
         },
-        fit: fit_file(design, &parameters, &fit, noise_known, scan, &mut warnings),
+        fit: fit_file(design, &parameters, &noisy, scan, &mut warnings),
         explanations,
         best_explanation,
         accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
@@ -171,7 +176,7 @@ pub fn compare(
     let predicted = weighted.predicted;
     Ok(ScanReport::new(
         file,
-        [fit.fitted, predicted],
+        [noisy.fit.fitted, predicted],
         warnings,
         solved.tolerance,
     ))
@@ -234,68 +239,42 @@ fn large_enough(scan: &Scan, parameters: &[Parameter]) -> Result<(), String> {
     ))
 }
 
-fn field(quantity: &Measured) -> bool {
-    matches!(quantity, Measured::Field(_))
+/// Kinds of measured numbers, each with a noise of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Field,
+    Gradient,
 }
 
-fn gradient(quantity: &Measured) -> bool {
-    !field(quantity)
+impl Kind {
+    const ALL: [Self; 2] = [Self::Field, Self::Gradient];
+
+    fn of(quantity: &Measured) -> Self {
+        match quantity {
+            Measured::Field(_) => Self::Field,
+            Measured::Gradient(..) => Self::Gradient,
+        }
+    }
 }
 
 /// The numbers of one kind, with their place.
 fn of_kind<'a>(
     scan: &'a Scan,
     values: &'a [f64],
-    kind: fn(&Measured) -> bool,
+    kind: Kind,
 ) -> impl Iterator<Item = (usize, f64)> + 'a {
     let count = scan.quantities.len();
     let all = values.iter().copied().enumerate();
-    all.filter(move |(at, _)| kind(&scan.quantities[at % count]))
+    all.filter(move |(at, _)| Kind::of(&scan.quantities[at % count]) == kind)
 }
 
 /// Root mean square of one kind; `None` where there is none.
-fn rms(scan: &Scan, values: &[f64], kind: fn(&Measured) -> bool) -> Option<f64> {
+fn rms(scan: &Scan, values: &[f64], kind: Kind) -> Option<f64> {
     let (count, sum) = of_kind(scan, values, kind)
         .fold((0_usize, 0.0), |(count, sum), (_, value)| {
             (count + 1, sum + value * value)
         });
     (count > 0).then(|| (sum / count as f64).sqrt())
-}
-
-/// The stated noise of both kinds, where it is stated for all that was measured.
-fn noises(scan: &Scan, request: &ScanRequest) -> Option<[f64; 2]> {
-    let needed = |kind: fn(&Measured) -> bool, noise: Option<f64>| {
-        if scan.quantities.iter().any(kind) {
-            noise
-        } else {
-            Some(1.0)
-        }
-    };
-    Some([
-        needed(field, request.noise_t)?,
-        needed(gradient, request.noise_t_per_m)?,
-    ])
-}
-
-/// One over the noise; where it is not known, over the size of what was measured, so that field and
-/// gradient count alike.
-fn weights(scan: &Scan, request: &ScanRequest) -> Vec<f64> {
-    let size = |kind| {
-        rms(scan, &scan.values, kind)
-            .filter(|size| *size > 0.0)
-            .unwrap_or(1.0)
-    };
-    let [of_field, of_gradient] =
-        noises(scan, request).unwrap_or_else(|| [size(field), size(gradient)]);
-    let one = |quantity: &Measured| {
-        1.0 / if field(quantity) {
-            of_field
-        } else {
-            of_gradient
-        }
-    };
-    let row: Vec<f64> = scan.quantities.iter().map(one).collect();
-    row.repeat(scan.rows())
 }
 
 fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
@@ -308,7 +287,7 @@ fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
 
 /// Errors claimed of the computed field and gradient.
 fn model_errors(scan: &Scan, predicted: &[f64], relative_error: f64) -> [f64; 2] {
-    [field, gradient].map(|kind| {
+    Kind::ALL.map(|kind| {
         let values = of_kind(scan, predicted, kind);
         relative_error * values.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
     })
@@ -317,7 +296,7 @@ fn model_errors(scan: &Scan, predicted: &[f64], relative_error: f64) -> [f64; 2]
 /// States what is left of a measurement.
 struct ResidualReport<'a> {
     scan: &'a Scan,
-    request: &'a ScanRequest,
+    noisy: &'a NoisyFit,
     model_errors: [f64; 2],
 }
 
@@ -326,7 +305,8 @@ impl ResidualReport<'_> {
     fn left(&self, given: &[f64]) -> Left {
         let scan = self.scan;
         let left: Vec<f64> = scan.values.iter().zip(given).map(|(m, g)| m - g).collect();
-        let of = |kind: fn(&Measured) -> bool| {
+        let of = |kind: Kind| {
+            let noise = self.noisy.of(kind)?;
             let rms_left = rms(scan, &left, kind)?;
             let first = of_kind(scan, &left, kind).next()?;
             let (at, largest) = of_kind(scan, &left, kind).fold(first, |most, one| {
@@ -336,33 +316,46 @@ impl ResidualReport<'_> {
                     most
                 }
             });
-            Some((
-                rms_left,
-                largest,
-                self.place(at),
-                rms(scan, &scan.values, kind)?,
-            ))
+            let measured = rms(scan, &scan.values, kind)?;
+            Some((rms_left, largest, self.place(at), measured, noise))
         };
         Left {
-            field: of(field).map(|(rms_t, largest_t, at, measured_rms_t)| FieldLeft {
+            field: of(Kind::Field).map(|(rms_t, largest_t, at, measured_rms_t, noise)| FieldLeft {
                 rms_t,
                 largest_t,
                 at,
                 measured_rms_t,
                 model_error_t: self.model_errors[0],
-                noise_t: self.request.noise_t,
+                noise_t: noise.given,
+                estimated_noise_t: self.noisy.estimated(noise),
+                reduced_chi_square: None,
             }),
-            gradient: of(gradient).map(|(rms_t_per_m, largest_t_per_m, at, measured)| {
-                GradientLeft {
+            gradient: of(Kind::Gradient).map(
+                |(rms_t_per_m, largest_t_per_m, at, measured_rms_t_per_m, noise)| GradientLeft {
                     rms_t_per_m,
                     largest_t_per_m,
                     at,
-                    measured_rms_t_per_m: measured,
+                    measured_rms_t_per_m,
                     model_error_t_per_m: self.model_errors[1],
-                    noise_t_per_m: self.request.noise_t_per_m,
-                }
-            }),
+                    noise_t_per_m: noise.given,
+                    estimated_noise_t_per_m: self.noisy.estimated(noise),
+                    reduced_chi_square: None,
+                },
+            ),
         }
+    }
+
+    /// Residuals of the measurement less the fit, held against each given noise.
+    fn fitted(&self) -> Left {
+        let mut left = self.left(&self.noisy.fit.fitted);
+        let ratio = |kind| self.noisy.of(kind).and_then(Noise::reduced_chi_square);
+        if let Some(field) = &mut left.field {
+            field.reduced_chi_square = ratio(Kind::Field);
+        }
+        if let Some(gradient) = &mut left.gradient {
+            gradient.reduced_chi_square = ratio(Kind::Gradient);
+        }
+        left
     }
 
     fn place(&self, at: usize) -> ScanPlace {
@@ -381,22 +374,14 @@ impl ResidualReport<'_> {
 fn fit_file(
     design: &Design,
     parameters: &[Parameter],
-    fit: &Fit,
-    noise_known: bool,
+    noisy: &NoisyFit,
     scan: &Scan,
     warnings: &mut Vec<String>,
 ) -> FitFile {
-    let freedom = scan.values.len().saturating_sub(fit.linear.rank).max(1);
-    let chi_square = fit.left / freedom as f64;
-    // Stated noise is believed unless more is left.
-    let noise = if noise_known {
-        chi_square.max(1.0).sqrt()
-    } else {
-        chi_square.sqrt()
-    };
+    let fit = &noisy.fit;
     let found = |sought: Parameter| -> (Option<f64>, Option<f64>) {
         let place = parameters.iter().position(|p| *p == sought);
-        let error = place.and_then(|k| fit.linear.unit_errors[k].map(|e| e * fit.steps[k] * noise));
+        let error = place.and_then(|k| noisy.error(k));
         let value = place.filter(|_| error.is_some()).map(|k| fit.values[k]);
         (value, error)
     };
@@ -433,8 +418,8 @@ fn fit_file(
             .map(|set| set.into_iter().map(|k| parameters[k].name()).collect())
             .collect(),
         cutoff: CUTOFF,
-        degrees_of_freedom: freedom,
-        reduced_chi_square: noise_known.then_some(chi_square),
+        degrees_of_freedom: scan.values.len().saturating_sub(fit.linear.rank).max(1),
+        reduced_chi_square: noisy.reduced_chi_square(),
         iterations: fit.iterations,
         converged: fit.converged,
     }

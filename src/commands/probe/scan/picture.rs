@@ -1,34 +1,32 @@
 //! A scan beside what was computed, as a drawing.
 
-use super::{ScanReport, field, gradient};
+use super::{Kind, ScanReport};
 use crate::bundle::scan::{Measured, Scan};
 use crate::plot::scan_fit::{ScanColumn, ScanFitPlot, ScanKind};
 
 impl ScanReport {
     /// Measured values over computed ones, and the residuals beside the stated noise; where it is not
-    /// stated, beside their own size after the fit.
+    /// stated, beside the estimated one.
     #[must_use]
     pub fn picture(&self, scan: &Scan, name: &str) -> ScanFitPlot {
         let left = &self.file.residuals.fitted;
-        let of_field = left.field.as_ref().map(|left| (left.noise_t, left.rms_t));
-        let of_gradient = left
-            .gradient
-            .as_ref()
-            .map(|left| (left.noise_t_per_m, left.rms_t_per_m));
-        let kind = |quantity, of: fn(&Measured) -> bool, left: Option<(Option<f64>, f64)>| {
-            let (noise, rms) = left?;
+        let field = left.field.as_ref();
+        let field = field.map(|left| (left.noise_t, left.estimated_noise_t));
+        let gradient = left.gradient.as_ref();
+        let gradient = gradient.map(|left| (left.noise_t_per_m, left.estimated_noise_t_per_m));
+        let kind = |quantity, kind: Kind, noise: Option<(Option<f64>, Option<f64>)>| {
+            let (stated, estimated) = noise?;
+            let stated = stated.map(|noise| (noise, "the stated noise"));
+            let estimated = estimated.map(|noise| (noise, "the estimated noise"));
             Some(ScanKind {
                 quantity,
-                columns: self.columns(scan, of),
-                sigma: match noise {
-                    Some(noise) => (noise, "the stated noise"),
-                    None => (rms, "what the fit leaves (rms)"),
-                },
+                columns: self.columns(scan, kind),
+                sigma: stated.or(estimated)?,
             })
         };
         let kinds = [
-            kind(["field", "T"], field, of_field),
-            kind(["gradient", "T/m"], gradient, of_gradient),
+            kind(["field", "T"], Kind::Field, field),
+            kind(["gradient", "T/m"], Kind::Gradient, gradient),
         ];
         ScanFitPlot {
             title: format!("{name} against {}", self.file.design),
@@ -36,13 +34,13 @@ impl ScanReport {
         }
     }
 
-    fn columns(&self, scan: &Scan, of: fn(&Measured) -> bool) -> Vec<ScanColumn> {
+    fn columns(&self, scan: &Scan, kind: Kind) -> Vec<ScanColumn> {
         let count = scan.quantities.len();
         let quantities = scan
             .quantities
             .iter()
             .enumerate()
-            .filter(|(_, quantity)| of(quantity));
+            .filter(|(_, quantity)| Kind::of(quantity) == kind);
         let column = |(at, quantity): (usize, &Measured)| ScanColumn {
             name: quantity.column(),
             values: [&scan.values, &self.predicted, &self.fitted]
