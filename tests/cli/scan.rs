@@ -786,6 +786,9 @@ fn a_scan_is_drawn_beside_its_fit() {
     run(&["--plot", "fit.pdf"]).ends(0);
     assert!(place.read("fit.pdf").starts_with(b"%PDF"));
     run(&["--plot", "-", "--out", "-"]).ends(2);
+    run(&["--noise-t-per-m", "1e-3"])
+        .ends(3)
+        .says(&["no gradient values"]);
     let alone = [
         "probe",
         "designs/seed_air.toml",

@@ -114,6 +114,7 @@ pub fn compare(
     let scene = Scene::with_tolerance(design, request.tolerance)?;
     let parameters = fit::parameters(request.fitted, scan, scene.coils.len());
     large_enough(scan, &parameters).map_err(refused)?;
+    noise::is_of_values(scan, request).map_err(refused)?;
     if let Some(hint) = units::coordinates(design, &scan.positions_m) {
         return Err(refused(hint));
     }

@@ -112,16 +112,45 @@ pub(super) fn fit(
     Ok(noisy)
 }
 
+impl Kind {
+    /// Its name and the option that states its noise.
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Field => ("field", "--noise-t"),
+            Self::Gradient => ("gradient", "--noise-t-per-m"),
+        }
+    }
+
+    fn given(self, request: &ScanRequest) -> Option<f64> {
+        match self {
+            Self::Field => request.noise_t,
+            Self::Gradient => request.noise_t_per_m,
+        }
+    }
+}
+
+/// Refuses a noise of what was not measured.
+pub(super) fn is_of_values(scan: &Scan, request: &ScanRequest) -> Result<(), String> {
+    let absent =
+        |kind: &Kind| kind.given(request).is_some() && rms(scan, &scan.values, *kind).is_none();
+    Kind::ALL.into_iter().find(absent).map_or(Ok(()), |kind| {
+        let (values, option) = kind.words();
+        Err(format!(
+            "{option}: the scan holds no {values} values; leave it out"
+        ))
+    })
+}
+
 /// The given noises; the same part of the measured values for one that is not given.
 fn first(scan: &Scan, request: &ScanRequest) -> Vec<Noise> {
-    let given = |kind| match kind {
-        Kind::Field => request.noise_t,
-        Kind::Gradient => request.noise_t_per_m,
-    };
     let sizes = Kind::ALL.map(|kind| (kind, rms(scan, &scan.values, kind)));
     let kinds = sizes.into_iter().filter_map(|(kind, size)| {
         let size = size?;
-        Some((kind, if size > 0.0 { size } else { 1.0 }, given(kind)))
+        Some((
+            kind,
+            if size > 0.0 { size } else { 1.0 },
+            kind.given(request),
+        ))
     });
     let kinds: Vec<_> = kinds.collect();
     let relative = kinds
@@ -200,10 +229,7 @@ impl NoisyFit {
         self.shared.then(|| {
             let few = self.noises.iter().filter(|noise| noise.given.is_none());
             let few = few.min_by(|a, b| a.freedom.total_cmp(&b.freedom))?;
-            let (values, option) = match few.kind {
-                Kind::Field => ("field", "--noise-t"),
-                Kind::Gradient => ("gradient", "--noise-t-per-m"),
-            };
+            let (values, option) = few.kind.words();
             Some(format!(
                 "the scan has too few {values} values to estimate their noise: it is taken as the \
                  same part of the measured values for field and gradient; state it with {option}"
