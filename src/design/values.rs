@@ -16,6 +16,14 @@ use fluxform_numerics::axis::Axis;
 /// Longest name of a document, bytes.
 const NAME_MAX: usize = 100;
 
+/// The name of a document that is made of the one called `name`: `name` and `suffix`, of which `name` is cut where
+/// both would be longer than a name may be.
+#[must_use]
+pub fn derived_name(name: &str, suffix: &str) -> String {
+    let most = NAME_MAX.saturating_sub(suffix.len());
+    format!("{}{suffix}", &name[..name.floor_char_boundary(most)])
+}
+
 /// Largest count, far above what any bound on a product of counts admits.
 const COUNT_MAX: f64 = 1e9;
 
@@ -591,5 +599,23 @@ fn described(value: &DeValue<'_>) -> String {
         DeValue::Datetime(_) => "a date or time".to_owned(),
         DeValue::Array(items) => format!("a list of {}", items.len()),
         DeValue::Table(_) => "a section".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_derived_name_is_one_of_a_document() {
+        assert_eq!(derived_name("seed", "_optimum"), "seed_optimum");
+        for length in [NAME_MAX - 8, NAME_MAX - 7, NAME_MAX] {
+            let name = derived_name(&"a".repeat(length), "_optimum");
+            assert_eq!(name.len(), NAME_MAX);
+            assert!(name.ends_with("a_optimum"), "{name}");
+        }
+        // No character is cut in two.
+        assert_eq!(derived_name(&"\u{e9}".repeat(60), "_array").len(), 100);
+        assert_eq!(derived_name(&"\u{e9}".repeat(60), "_arrays").len(), 99);
     }
 }

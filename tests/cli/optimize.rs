@@ -424,6 +424,23 @@ fn a_start_outside_the_limits_changes_nothing() {
     assert!(none.get("given").is_none());
 }
 
+/// The name of the best coil's design was too long for one: "the best coil makes no design of its own".
+#[test]
+fn regression_a_long_name_left_no_coil() {
+    let place = Place::new();
+    for length in [92, 93, 100] {
+        let name = "a".repeat(length);
+        let text = LIMITS.replace("odd", &name);
+        place.write("long.toml", &format!("{text}[limits]\npower_max_w = 7.0\n"));
+        place
+            .run(&["optimize", "long.toml", "--out", "best.toml", "--force"])
+            .ends(0);
+        let best = format!("name = \"{}_optimum\"", &name[..92]);
+        assert!(place.text("best.toml").contains(&best));
+        place.run(&["evaluate", "best.toml"]).ends(0);
+    }
+}
+
 #[test]
 fn without_a_coil_the_limit_to_blame_is_named() {
     let place = Place::new();

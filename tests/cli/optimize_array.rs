@@ -77,6 +77,22 @@ fn the_best_array_meets_its_limits_and_is_a_design() {
     place.run(&["verify", bundle]).ends(0);
 }
 
+/// The name of the best array's design was too long for one.
+#[test]
+fn regression_a_long_name_left_no_array() {
+    let place = Place::new();
+    let name = "a".repeat(100);
+    let text = place
+        .text(SEED)
+        .replace("\"seed_air\"", &format!("{name:?}"));
+    place.write("long.toml", &text);
+    let vary = ["--vary", "array.pitch_mm=38:60", "--evaluations", "2"];
+    let args = ["optimize", "long.toml", "--for", FLAT, "--out", "best.toml"];
+    place.run(&[&args[..], &vary].concat()).ends(0);
+    let best = format!("name = \"{}_array\"", &name[..94]);
+    assert!(place.text("best.toml").contains(&best));
+}
+
 /// Two cored coils: the pattern of opposite currents settles more slowly than a coil alone.
 #[test]
 fn regression_the_settling_limit_held_for_a_coil_alone() {

@@ -10,6 +10,7 @@ use crate::coil::limits::{LimitCheck, LimitName, by_key};
 use crate::coil::optimum::problem::{Regime, Task};
 use crate::coil::optimum::{BestCoil, Fixed};
 use crate::design::template::Template;
+use crate::design::values::derived_name;
 use crate::design::{Design, Need, Severity};
 use crate::scene::Scene;
 use crate::scene::neighbours::of_rated;
@@ -229,7 +230,7 @@ fn text_of(
     let mut settings = vec![
         (
             "name",
-            toml::Value::String(format!("{}_optimum", design.name)),
+            toml::Value::String(derived_name(&design.name, "_optimum")),
         ),
         ("coil.inner_diameter_mm", number(sizes.inner)),
         ("coil.outer_diameter_mm", number(sizes.outer)),

@@ -27,6 +27,7 @@ use crate::coil::limits::{self, LimitCheck};
 use crate::commands::evaluate::evaluate;
 use crate::design::search::SearchKey;
 use crate::design::template::Template;
+use crate::design::values::derived_name;
 use crate::design::{Design, InvalidDocument, Need};
 use crate::lambda::Criterion;
 use crate::lambda::feedback::NoLambda;
@@ -531,7 +532,7 @@ fn written(document: &Document<'_>, found: &Found<'_>) -> Result<(String, Design
     let mut template = Template::new(document.text, document.path)
         .map_err(|error| RunError::Input(error.to_string()))?;
     remove.into_iter().for_each(|key| template.remove(key));
-    let name = toml::Value::String(format!("{}_array", document.design.name));
+    let name = toml::Value::String(derived_name(&document.design.name, "_array"));
     let settings = std::iter::once(("name", name)).chain(set);
     let text = template.with(settings).map_err(RunError::Input)?;
     let (design, _) =
