@@ -8,6 +8,8 @@ use super::diagnostics::{Fault, InvalidDocument};
 
 /// Parts of a dotted key.
 const PARTS_MAX: usize = 8;
+/// Sections that a design may have several of.
+const SEVERAL: [&str; 1] = ["iron"];
 
 /// A design document whose keys can be set again, one variant after the other.
 #[derive(Debug, Clone)]
@@ -60,35 +62,118 @@ impl Template {
     /// The document's text with `settings`: dotted keys and their values. Sections that a key
     /// names and the document lacks are added. Comments and order are not kept.
     ///
+    /// Of a table that may be there several times, as `[[iron]]`, the key names one by its index from 0,
+    /// `iron.0.size_mm`; where there is one alone it needs no index.
+    ///
     /// # Errors
-    /// A key that leads through something that is no section; the message names it.
+    /// A key that leads through something that is no section, or to a table that is not there or not
+    /// determined; the message names it.
     pub fn with<'a>(
         &self,
         settings: impl IntoIterator<Item = (&'a str, Value)>,
     ) -> Result<String, String> {
         let mut table = self.table.clone();
         for (key, value) in settings {
-            // No key of a design has so many; a table as deep as a key is long would not be written.
-            if key.split('.').nth(PARTS_MAX).is_some() {
-                let shown: String = key.chars().take(40).collect();
-                return Err(format!(
-                    "{shown}...: the key has more than {PARTS_MAX} parts; name a section and a key \
-                     in it, as in wire.diameter_mm"
-                ));
-            }
-            let mut here = &mut table;
-            let mut path = key;
-            while let Some((section, rest)) = path.split_once('.') {
-                here = here
-                    .entry(section)
-                    .or_insert_with(|| Value::Table(Table::new()))
-                    .as_table_mut()
-                    .ok_or_else(|| format!("{key}: {section} is not a section of the design"))?;
-                path = rest;
-            }
-            here.insert(path.to_owned(), value);
+            set(&mut table, key, value)?;
         }
         Ok(table.to_string())
+    }
+
+    /// The one spelling of a key of this document: with the index of a table that is one of several,
+    /// without it where the document holds no array of tables there.
+    ///
+    /// # Errors
+    /// As [`Template::with`].
+    pub fn place(&self, key: &str) -> Result<String, String> {
+        check_parts(key)?;
+        let mut here = Some(&self.table);
+        let mut path = key;
+        let mut place = String::new();
+        while let Some((section, rest)) = path.split_once('.') {
+            place = place + section + ".";
+            let value = here.and_then(|table| table.get(section));
+            let (index, rest) = step(key, section, value, rest)?;
+            here = match (value, index) {
+                (Some(Value::Array(tables)), Some(index)) => {
+                    place = format!("{place}{index}.");
+                    tables[index].as_table()
+                }
+                (value, _) => value.and_then(Value::as_table),
+            };
+            path = rest;
+        }
+        Ok(place + path)
+    }
+}
+
+/// No key of a design has so many parts; a table as deep as a key is long would not be written.
+fn check_parts(key: &str) -> Result<(), String> {
+    if key.split('.').nth(PARTS_MAX).is_none() {
+        return Ok(());
+    }
+    let shown: String = key.chars().take(40).collect();
+    Err(format!(
+        "{shown}...: the key has more than {PARTS_MAX} parts; name a section and a key in it, as in \
+         wire.diameter_mm"
+    ))
+}
+
+fn set(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
+    check_parts(key)?;
+    let mut here = table;
+    let mut path = key;
+    while let Some((section, rest)) = path.split_once('.') {
+        let (index, rest) = step(key, section, here.get(section), rest)?;
+        let inner = here
+            .entry(section)
+            .or_insert_with(|| Value::Table(Table::new()));
+        let inner = match (inner, index) {
+            (Value::Array(tables), Some(index)) => &mut tables[index],
+            (inner, _) => inner,
+        };
+        here = inner
+            .as_table_mut()
+            .ok_or_else(|| not_a_section(key, section))?;
+        path = rest;
+    }
+    here.insert(path.to_owned(), value);
+    Ok(())
+}
+
+fn not_a_section(key: &str, section: &str) -> String {
+    format!("{key}: {section} is not a section of the design")
+}
+
+/// Of `section`, which is there as `value`, the index of the table that `key` leads to, where it is one of
+/// several, and what is left of the key.
+fn step<'k>(
+    key: &str,
+    section: &str,
+    value: Option<&Value>,
+    rest: &'k str,
+) -> Result<(Option<usize>, &'k str), String> {
+    let count = match value {
+        Some(Value::Array(tables)) if tables.iter().all(Value::is_table) => tables.len(),
+        None | Some(Value::Table(_)) if SEVERAL.contains(&section) => 1,
+        None | Some(Value::Table(_)) => return Ok((None, rest)),
+        Some(_) => return Err(not_a_section(key, section)),
+    };
+    let (first, after) = rest.split_once('.').unwrap_or((rest, ""));
+    let digits = !first.is_empty() && first.bytes().all(|byte| byte.is_ascii_digit());
+    match (digits, first.parse()) {
+        (true, Ok(index)) if index < count && !after.is_empty() => Ok((Some(index), after)),
+        (true, Ok(index)) if index < count => Err(format!(
+            "{key} is a whole [[{section}]]: name a key in it, as in {key}.size_mm"
+        )),
+        (true, _) => Err(format!(
+            "{key}: the design has no [[{section}]] {first}, which is counted from 0"
+        )),
+        (false, _) if count == 1 => Ok((Some(0), rest)),
+        (false, _) if count == 0 => Err(format!("{key}: the design has no [[{section}]]")),
+        (false, _) => Err(format!(
+            "{key}: the design has {count} [[{section}]]: name one by its index, as in {section}.0.{rest} \
+             for the first"
+        )),
     }
 }
 
@@ -126,6 +211,57 @@ mod tests {
         let read: Table = template.with([]).unwrap().parse().unwrap();
         assert!(read["wire"].as_table().unwrap().is_empty());
         assert_eq!(read["name"].as_str(), Some("a"));
+    }
+
+    /// No key of `[[iron]]` could be set: "iron is not a section of the design".
+    #[test]
+    fn regression_a_table_of_several_was_no_section() {
+        let body = |size: &str| format!("[[iron]]\nshape = \"box\"\nsize_mm = {size}\n");
+        let of = |text: &str| Template::new(text, Path::new("a.toml")).unwrap();
+        let sizes = |template: &Template, key: &str| -> Vec<f64> {
+            let text = template.with([(key, Value::Float(1.3))]).unwrap();
+            let read: Table = text.parse().unwrap();
+            let tables = match &read["iron"] {
+                Value::Array(tables) => tables.clone(),
+                one => vec![one.clone()],
+            };
+            tables
+                .iter()
+                .map(|it| it["size_mm"].as_float().unwrap())
+                .collect()
+        };
+        let one = of(&body("0.7"));
+        assert_eq!(sizes(&one, "iron.0.size_mm"), [1.3]);
+        assert_eq!(sizes(&one, "iron.size_mm"), [1.3]);
+        let two = of(&(body("0.7") + &body("1.9")));
+        assert_eq!(sizes(&two, "iron.0.size_mm"), [1.3, 1.9]);
+        assert_eq!(sizes(&two, "iron.1.size_mm"), [0.7, 1.3]);
+        // One that is written as a section, and none.
+        for text in [body("0.7").replace("[[iron]]", "[iron]"), String::new()] {
+            for key in ["iron.0.size_mm", "iron.size_mm"] {
+                assert_eq!(sizes(&of(&text), key), [1.3], "{text}{key}");
+                assert_eq!(of(&text).place(key).unwrap(), "iron.size_mm");
+            }
+        }
+        for key in ["iron.0.size_mm", "iron.00.size_mm", "iron.size_mm"] {
+            assert_eq!(one.place(key).unwrap(), "iron.0.size_mm");
+        }
+        assert_eq!(one.place("wire.diameter_mm").unwrap(), "wire.diameter_mm");
+        for (key, said) in [
+            (
+                "iron.size_mm",
+                "the design has 2 [[iron]]: name one by its index, as in iron.0.size_mm",
+            ),
+            (
+                "iron.2.size_mm",
+                "the design has no [[iron]] 2, which is counted from 0",
+            ),
+            ("iron.1", "iron.1 is a whole [[iron]]: name a key in it"),
+        ] {
+            let refused = two.with([(key, Value::Float(1.3))]).unwrap_err();
+            assert!(refused.contains(said), "{refused}");
+            assert_eq!(two.place(key).unwrap_err(), refused);
+        }
     }
 
     #[test]

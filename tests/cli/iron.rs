@@ -540,6 +540,46 @@ fn a_bundle_keeps_the_mesh_and_verifies_from_its_copy() {
         .says(&["iron_0.stl of the bundle stands for it"]);
 }
 
+/// No key of `[[iron]]` could be set: "iron is not a section of the design".
+#[test]
+fn regression_a_sweep_set_no_key_of_iron() {
+    let place = Place::new();
+    let bodies = [(20, 60), (8, -60)].map(|(side, x)| {
+        format!(
+            "[[iron]]\nshape = \"box\"\nsize_mm = [4, {side}, {side}]\ncenter_mm = [{x}, 0, 0]\n"
+        )
+    });
+    let body = bodies.concat();
+    design(&place, &format!("{CORE}{body}"));
+    let plan = ["sweep", "plan", "design.toml", "--tolerance", "0.1"];
+    let set = ["--set", "iron.1.size_mm=[4,8,8],[4,20,20]"];
+    place.run(&[&plan[..], &set].concat()).ends(0);
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "points"])
+        .ends(0);
+    place
+        .run(&["sweep", "merge", "plan.json", "points"])
+        .ends(0);
+    let table = place.text("sweep.csv");
+    let mut lines = table.lines();
+    assert!(
+        lines.next().unwrap().contains(",iron.1.size_mm,"),
+        "{table}"
+    );
+    for (line, size) in lines.zip([8, 20]) {
+        let alone = body.replace("[4, 8, 8]", &format!("[4, {size}, {size}]"));
+        let known = evaluated(&place, &format!("{CORE}{alone}"));
+        let peak = &known["array"]["iron"]["peak_field_t"];
+        assert!(line.contains(&format!("\"[4,{size},{size}]\"")), "{line}");
+        assert!(line.contains(&peak.to_string()), "{peak}: {line}");
+    }
+    let several = ["--set", "iron.size_mm=[4,8,8],[4,20,20]"];
+    place
+        .run(&[&plan[..], &several].concat())
+        .ends(3)
+        .says(&["2 [[iron]]: name one by its index, as in iron.0.size_mm"]);
+}
+
 #[test]
 fn the_plan_of_a_sweep_records_the_mesh() {
     let place = Place::new();

@@ -20,8 +20,8 @@ use crate::shape::document::ShapeDocument;
 
 /// Values at fault that are reported one by one.
 const LISTED: usize = 20;
-/// The key of a B-H table.
-const CURVE_KEY: &str = "core.bh_curve";
+/// Sections of which a coil that is searched alone knows nothing.
+const OF_STEEL: [&str; 2] = ["plate", "iron"];
 
 /// The options of a plan.
 #[derive(Debug, Clone)]
@@ -45,16 +45,9 @@ impl PlanRequest {
     /// Axes that do not go together: the same key twice, too many designs.
     pub fn check(&self) -> Result<u64, String> {
         let mut points = 1u64;
-        for (at, axis) in self.axes.iter().enumerate() {
-            let within = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}."));
-            for other in &self.axes[..at] {
-                if within(&axis.key, &other.key) || within(&other.key, &axis.key) {
-                    return Err(format!(
-                        "{} and {} set the same key: give all its values in one --set",
-                        other.key, axis.key
-                    ));
-                }
-            }
+        let places: Vec<String> = self.axes.iter().map(|axis| axis.key.clone()).collect();
+        check_distinct(&self.axes, &places)?;
+        for axis in &self.axes {
             points = points.saturating_mul(axis.values.len() as u64);
         }
         if points > POINTS_MAX {
@@ -65,6 +58,26 @@ impl PlanRequest {
         }
         Ok(points)
     }
+}
+
+/// Whether `key` is `other` or a part of it.
+fn is_within(key: &str, other: &str) -> bool {
+    let rest = key.strip_prefix(other);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+/// That no key is set twice: where each axis' key is in the design, in `places`.
+fn check_distinct(axes: &[Axis], places: &[String]) -> Result<(), String> {
+    for (at, place) in places.iter().enumerate() {
+        let same = |other: &String| is_within(place, other) || is_within(other, place);
+        if let Some(other) = places[..at].iter().position(same) {
+            return Err(format!(
+                "{} and {} set the same key: give all its values in one --set",
+                axes[other].key, axes[at].key
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The plan for `design`, whose `text` came from `input`.
@@ -82,25 +95,19 @@ pub fn plan(
     request: &PlanRequest,
 ) -> Result<PlanFile, RunError> {
     let path = PathBuf::from(&input.path);
-    check_values(&text, &path, &request.axes)?;
-    let searched = request
-        .axes
-        .iter()
-        .any(|axis| axis.key.starts_with("search"));
+    let template = Template::new(&text, &path).map_err(|e| RunError::Input(e.to_string()))?;
+    let axes = &request.axes;
+    if matches!(request.mode, Mode::Optimize | Mode::OptimizeWound) {
+        check_effective(axes)?;
+    }
+    let places = places(&template, &path, axes)?;
+    check_values(&template, &path, axes, &places)?;
+    let searched = axes.iter().any(|axis| axis.key.starts_with("search"));
     if request.array.is_some() && !searched && design.search == SearchSpace::default() {
         return Err(RunError::Input(NOTHING_SEARCHED.to_owned()));
     }
-    let finds_winding = matches!(request.mode, Mode::Optimize | Mode::OptimizeWound);
-    let idle = request.axes.iter().find(|it| it.key.starts_with("coil."));
-    if let (true, Some(axis)) = (finds_winding, idle) {
-        return Err(RunError::Input(format!(
-            "{}: every design of such a sweep has the best winding, whatever the given one is; vary limits, wire, core \
-             or magnet, or leave out --optimize",
-            axis.key
-        )));
-    }
     let mut inputs = vec![input];
-    for file in named_files(design, &path, &request.axes) {
+    for file in named_files(design, &path, axes, &places) {
         inputs.push(NamedContent::read(file)?.input());
     }
     let plan = PlanFile::new(
@@ -142,25 +149,82 @@ pub(super) fn shape_inputs(shapes: &[ShapeSource]) -> Vec<Input> {
     shapes.iter().flat_map(of).collect()
 }
 
-/// The files that the variants name: of an axis those of all its values, in their order.
-fn named_files(design: &Design, path: &Path, axes: &[Axis]) -> Vec<NamedFile> {
-    let beside = |file: &String| path.parent().unwrap_or(Path::new("")).join(file);
-    let varied = axes.iter().find(|axis| axis.key == CURVE_KEY);
-    let curves = varied.into_iter().flat_map(|axis| &axis.values);
-    let curves = curves.filter_map(|value| match value {
-        Value::Text(file) => Some(NamedFile {
-            role: Role::Curve,
-            path: beside(file),
-        }),
-        _ => None,
-    });
-    let mut own = design.named_files();
-    own.retain(|file| varied.is_none() || file.role != Role::Curve);
-    curves.chain(own).collect()
+/// Where in the design the key of each axis is.
+fn places(template: &Template, path: &Path, axes: &[Axis]) -> Result<Vec<String>, RunError> {
+    let refused = |message| format!("{}: --set {message}", path.display());
+    let (mut places, mut faults) = (Vec::new(), Vec::new());
+    for axis in axes {
+        match template.place(&axis.key) {
+            Ok(place) => places.push(place),
+            Err(message) => faults.push(refused(message)),
+        }
+    }
+    if faults.is_empty() {
+        // An index may be left out.
+        faults.extend(check_distinct(axes, &places).err().map(refused));
+    }
+    if faults.is_empty() {
+        Ok(places)
+    } else {
+        Err(RunError::Input(faults.join("\n")))
+    }
 }
 
-fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> {
-    let template = Template::new(text, path).map_err(|e| RunError::Input(e.to_string()))?;
+/// That no axis is of the winding, which is found, or of steel that the search of a coil leaves out.
+fn check_effective(axes: &[Axis]) -> Result<(), RunError> {
+    for axis in axes {
+        let section = axis.key.split('.').next().unwrap_or("");
+        let why = if section == "coil" {
+            "whatever the given one is; vary limits, wire, core or magnet, or leave out --optimize"
+        } else if OF_STEEL.contains(&section) {
+            "found without [plate] and [[iron]]; leave out --optimize, or search whole arrays with --for"
+        } else {
+            continue;
+        };
+        return Err(RunError::Input(format!(
+            "{}: every design of such a sweep has the best winding, {why}",
+            axis.key
+        )));
+    }
+    Ok(())
+}
+
+/// The role of the file that a key names, if it names one.
+fn role_of(place: &str) -> Option<Role> {
+    match place.split('.').collect::<Vec<_>>()[..] {
+        ["core", "bh_curve"] => Some(Role::Curve),
+        ["iron", "surface"] => Some(Role::Mesh(0)),
+        ["iron", number, "surface"] => number.parse().ok().map(Role::Mesh),
+        _ => None,
+    }
+}
+
+/// The files that the variants name: of an axis those of all its values, in their order.
+fn named_files(design: &Design, path: &Path, axes: &[Axis], places: &[String]) -> Vec<NamedFile> {
+    let beside = |file: &String| path.parent().unwrap_or(Path::new("")).join(file);
+    let roles: Vec<Option<Role>> = places.iter().map(|place| role_of(place)).collect();
+    let mut all = Vec::new();
+    for (axis, role) in axes.iter().zip(&roles) {
+        let Some(role) = *role else { continue };
+        all.extend(axis.values.iter().filter_map(|value| match value {
+            Value::Text(file) => Some(NamedFile {
+                role,
+                path: beside(file),
+            }),
+            _ => None,
+        }));
+    }
+    let own = design.named_files().into_iter();
+    all.extend(own.filter(|file| !roles.contains(&Some(file.role))));
+    all
+}
+
+fn check_values(
+    template: &Template,
+    path: &Path,
+    axes: &[Axis],
+    places: &[String],
+) -> Result<(), RunError> {
     let first: Vec<&Value> = axes.iter().map(|axis| &axis.values[0]).collect();
     let mut faults: Vec<String> = Vec::new();
     for (varied, axis) in axes.iter().enumerate() {
@@ -170,7 +234,7 @@ fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> 
             .flat_map_iter(|value| {
                 let mut values = first.clone();
                 values[varied] = value;
-                fault_of(&template, path, axes, &values, varied)
+                fault_of(template, path, axes, places, &values, varied)
             })
             .collect();
         // A fault at the first value of every axis is found once for each axis.
@@ -194,6 +258,7 @@ fn fault_of(
     template: &Template,
     path: &Path,
     axes: &[Axis],
+    places: &[String],
     values: &[&Value],
     varied: usize,
 ) -> Vec<String> {
@@ -212,10 +277,10 @@ fn fault_of(
     faults
         .filter(|fault| fault.severity == Severity::Error)
         .map(|fault| {
-            let blamed = axes
-                .iter()
-                .position(|axis| axis.key == fault.key)
-                .unwrap_or(varied);
+            // A message names iron[0].size_mm[2].
+            let place = fault.key.replace('[', ".").replace(']', "");
+            let blamed = places.iter().position(|of| is_within(&place, of));
+            let blamed = blamed.unwrap_or(varied);
             let setting = format!("{} = {}", axes[blamed].key, toml_value(values[blamed]));
             let help = fault
                 .help
@@ -251,10 +316,68 @@ mod tests {
             tolerance: None,
             array,
         };
+        planned_of(DESIGN, &request)
+    }
+
+    fn planned_of(text: &str, request: &PlanRequest) -> Result<PlanFile, String> {
         request.check()?;
-        let (design, _) = Design::from_toml(DESIGN, Path::new("a.toml"), Need::SWEEP).unwrap();
-        let input = Input::of_bytes("a.toml", DESIGN.as_bytes());
-        plan(&design, DESIGN.to_owned(), input, &request).map_err(|error| error.to_string())
+        let (design, _) = Design::from_toml(text, Path::new("a.toml"), Need::SWEEP).unwrap();
+        let input = Input::of_bytes("a.toml", text.as_bytes());
+        plan(&design, text.to_owned(), input, request).map_err(|error| error.to_string())
+    }
+
+    fn among_iron(mode: Mode, bodies: usize, settings: &[&str]) -> Result<PlanFile, String> {
+        let body = "[[iron]]\nshape = \"box\"\nsize_mm = [7, 13, 19]\ncenter_mm = [70, 0, 0]\n";
+        let request = PlanRequest {
+            axes: settings.iter().map(|s| axis::parse(s).unwrap()).collect(),
+            mode,
+            seed: 0,
+            tolerance: None,
+            array: None,
+        };
+        planned_of(&format!("{DESIGN}{}", body.repeat(bodies)), &request)
+    }
+
+    #[test]
+    fn bodies_of_iron_are_set_by_their_index() {
+        let sizes = "iron.0.size_mm=[7,13,19],[9,13,19]";
+        let evaluated = |bodies, settings: &[&str]| among_iron(Mode::Evaluate, bodies, settings);
+        assert_eq!(
+            evaluated(1, &[sizes]).unwrap().axes[0].key,
+            "iron.0.size_mm"
+        );
+        assert!(evaluated(1, &["iron.size_mm=[7,13,19]"]).is_ok());
+        assert!(evaluated(2, &[sizes, "iron.1.center_mm=[70,0,0],[90,0,0]"]).is_ok());
+        for (bodies, settings, said) in [
+            (2, &["iron.size_mm=[7,13,19]"][..], "name one by its index"),
+            (1, &["iron.1.size_mm=[7,13,19]"], "has no [[iron]] 1"),
+            (0, &["iron.1.size_mm=[7,13,19]"], "has no [[iron]] 1"),
+            (1, &["iron.0=7"], "is a whole [[iron]]"),
+            (
+                1,
+                &[sizes, "iron.size_mm=[7,13,19]"],
+                "iron.0.size_mm and iron.size_mm set the same key",
+            ),
+            (
+                1,
+                &["wire.diameter_mm=0.7,1.3", "iron.0.size_mm=[7,13,-19]"],
+                "with --set iron.0.size_mm = [7, 13, -19]: iron[0].size_mm",
+            ),
+            (1, &["iron.0.surface=none.stl"], "none.stl"),
+        ] {
+            let refused = evaluated(bodies, settings).unwrap_err();
+            assert!(refused.contains(said), "{refused}");
+            assert!(!refused.contains("--set wire."), "{refused}");
+        }
+        for mode in [Mode::Optimize, Mode::OptimizeWound] {
+            for set in [sizes, "plate.thickness_mm=3,5"] {
+                let refused = among_iron(mode, 1, &[set]).unwrap_err();
+                assert!(
+                    refused.contains("found without [plate] and [[iron]]"),
+                    "{refused}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -28,7 +28,8 @@ use crate::numerics::mixed_search::Settings;
 /// Every --set names a key of the design and its values, as FROM:TO:STEP or as a list; the sweep
 /// holds every combination, the last --set varying fastest. TO belongs to a range when it lies
 /// within 1e-9 STEP of a step; values are rounded to 12 digits. Texts and flags are listed like
-/// numbers, lists as [0,0],[5,0]. The plan carries the design's text and a digest of itself, so
+/// numbers, lists as [0,0],[5,0]. Of several [[iron]] a key names one by its index from 0, as in
+/// iron.0.size_mm=[10,40,40],[12,40,40]. The plan carries the design's text and a digest of itself, so
 /// that nothing else is needed to run it but the B-H tables that the design names.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
