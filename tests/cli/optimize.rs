@@ -203,7 +203,7 @@ fn a_given_length_is_wound_in_its_own_turns() {
     place
         .run(&args)
         .ends(4)
-        .says(&["99.400000 mm (142 turns", "100.100000 mm (143 turns"]);
+        .says(&["99.4 mm (142 turns", "100.1 mm (143 turns"]);
 }
 
 #[test]
@@ -448,7 +448,7 @@ fn without_a_coil_the_limit_to_blame_is_named() {
         (
             "inner_diameter_min_mm = 41.0\nouter_diameter_max_mm = 38.0\n",
             "infeasible",
-            &["41.000000 mm", "are missing"][..],
+            &["41 mm", "are missing"][..],
         ),
         (
             "inner_diameter_min_mm = 30.0\nouter_diameter_max_mm = 38.0\n\

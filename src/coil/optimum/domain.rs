@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use super::problem::{LimitName, Problem, Regime};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_design::message_text::number;
 
 /// Ranges that every coil within the limits keeps; infinite where nothing bounds them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -216,9 +217,21 @@ impl Domain {
     }
 }
 
-/// Millimetres of a length, as messages have them.
+/// Millimetres of a length in their shortest form, to 14 digits: sizes that differ by [`TOUCHING`] may contradict
+/// each other.
 pub(super) fn mm(length_m: f64) -> String {
-    format!("{:.6} mm", length_m * 1e3)
+    let length_mm = length_m * 1e3;
+    let rounded = format!("{length_mm:.13e}").parse().unwrap_or(length_mm);
+    format!("{} mm", number(rounded))
+}
+
+/// Of a difference of sizes like `size_m` the digits that are no rounding.
+fn difference(difference_m: f64, size_m: f64) -> f64 {
+    let step_m = 0.1 * TOUCHING * size_m;
+    let digits = (difference_m.abs() / step_m).log10().max(0.0) as usize;
+    format!("{difference_m:.digits$e}")
+        .parse()
+        .unwrap_or(difference_m)
 }
 
 /// Of two limits on one size the first that is set, with its value in metres.
@@ -296,7 +309,7 @@ fn no_room_for_a_layer(problem: &Problem<'_>) -> Option<Contradiction> {
             mm(outer_m),
             mm(wire_m),
             mm(inner_m),
-            mm(missing)
+            mm(difference(missing, outer_m))
         ),
     })
 }
@@ -320,6 +333,46 @@ mod tests {
     use super::*;
     use crate::optimum::tests::{HEIGHT_M, air, task};
     use fluxform_design::Limits;
+
+    /// "0.000000 mm are missing", and "a length of 0.700000 mm leaves no room for one turn of 0.700000 mm wire".
+    #[test]
+    fn regression_sizes_that_contradict_each_other_were_printed_alike() {
+        let model = air(HEIGHT_M);
+        let of = |limits: Limits| {
+            let task = task(limits, None);
+            let problems = Problem::of_wire(&model, &task, task.strands[0]);
+            Domain::contradiction(&problems[0]).map(|found| found.message)
+        };
+        let layer = |inner_mm: f64| {
+            of(Limits {
+                outer_diameter_max_m: Some(0.038),
+                inner_diameter_min_m: Some(inner_mm * 1e-3),
+                ..Limits::default()
+            })
+        };
+        let said = |inner: &str, missing: &str| {
+            Some(format!(
+                "an outer diameter of 38 mm leaves no room for one layer of 0.7 mm wire around a bore of \
+                 {inner} mm: {missing} mm are missing"
+            ))
+        };
+        assert_eq!(layer(36.6), None);
+        assert_eq!(layer(36.600_000_1), said("36.6000001", "1e-7"));
+        assert_eq!(layer(36.600_000_000_1), said("36.6000000001", "1e-10"));
+        assert_eq!(layer(37.3), said("37.3", "0.7"));
+        assert_eq!(layer(36.723_456_7), said("36.7234567", "0.1234567"));
+        let turn = |length_mm: f64| {
+            of(Limits {
+                length_max_m: Some(length_mm * 1e-3),
+                ..Limits::default()
+            })
+        };
+        assert_eq!(turn(0.7), None);
+        assert_eq!(
+            turn(0.699_999_9).as_deref(),
+            Some("a length of 0.6999999 mm leaves no room for one turn of 0.7 mm wire")
+        );
+    }
 
     /// The supply's regime asks for a least resistance, and a limit may ask for less.
     #[test]

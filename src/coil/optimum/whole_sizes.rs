@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(of(Fixed::default()), Ok(1));
         let refused = of(length(0.1)).unwrap_err();
         assert!((refused.by - 1e-4).abs() < 1e-12, "{refused:?}");
-        let nearest = "99.400000 mm (142 turns of 0.700000 mm) or 100.100000 mm (143 turns";
+        let nearest = "99.4 mm (142 turns of 0.7 mm) or 100.1 mm (143 turns";
         assert!(refused.message.contains(nearest), "{refused:?}");
         let diameters = |outer_m| Fixed {
             inner_diameter_m: Some(0.024),
@@ -147,7 +147,7 @@ mod tests {
         assert!(
             refused
                 .message
-                .ends_with("the nearest: 25.400000 mm (1 layers of 0.700000 mm)"),
+                .ends_with("the nearest: 25.4 mm (1 layers of 0.7 mm)"),
             "{refused:?}"
         );
     }

@@ -387,10 +387,9 @@ fn impossible() -> Vec<Case> {
                     ..seed()
                 };
                 match found(limits, 0.03, 7e-4)?.status {
-                    OptimumStatus::Contradictory(c) => holds(
-                        c.message.contains("one layer of 0.700000 mm wire"),
-                        c.message,
-                    ),
+                    OptimumStatus::Contradictory(c) => {
+                        holds(c.message.contains("one layer of 0.7 mm wire"), c.message)
+                    }
                     other => Err(format!("{other:?}")),
                 }
             },
