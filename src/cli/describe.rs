@@ -122,7 +122,7 @@ pub fn heating(of: &Heating) -> String {
         )
     });
     format!(
-        "{} W at {}: from {} to {after} after {}, {steady} in the long run{limit}",
+        "{} W at {} and {}: {after} after {}, {steady} in the long run{limit}",
         number_to(of.power_w, 3),
         si(of.current_a, "A"),
         celsius(of.ambient_c),
