@@ -5,8 +5,9 @@
 //! three unknowns each step's quadratic programme is solved exactly. argmin does the searches in
 //! one variable (`wound`, `near_optimal_bore`).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 
+use fluxform_numerics::least_squares;
 use fluxform_numerics::small_quadratic::{Row, minimise};
 use fluxform_numerics::vec3::dot;
 
@@ -34,33 +35,30 @@ impl Point {
         active: &[usize],
         problem: &dyn Smooth,
     ) -> Option<f64> {
-        let slope = Vector3::from(self.slope);
+        let slope = self.slope.map(|s| -s);
         let mut least: Option<f64> = None;
         // Of all sets of at most three rows, those that are independent and push the right way.
         for set in 1_u32..1 << active.len().min(MOST_ACTIVE) {
-            let rows: Vec<usize> = (0..active.len())
-                .filter(|at| set >> at & 1 == 1)
-                .map(|at| active[at])
-                .collect();
-            if rows.len() > 3 {
-                continue;
-            }
-            let normals = DMatrix::from_fn(3, rows.len(), |i, k| self.normals[rows[k]][i]);
-            let svd = normals.clone().svd(true, true);
-            let independent = INDEPENDENT * normals.norm();
-            if svd.rank(independent) < rows.len() {
-                continue;
-            }
-            let Ok(found) = svd.solve(&-slope, 0.0) else {
-                continue;
-            };
-            let left = (&normals * &found + slope).norm();
-            let strongest = found.amax();
-            let pushes =
-                |k: usize| found[k] >= -BALANCED * strongest || problem.is_equality(rows[k]);
-            if left <= BALANCED * slope.norm() && (0..rows.len()).all(pushes) {
+            let rows = active
+                .iter()
+                .enumerate()
+                .filter(|(at, _)| set >> at & 1 == 1);
+            let rows: Vec<usize> = rows.map(|(_, row)| *row).collect();
+            let normals: Vec<Vec<f64>> =
+                rows.iter().map(|row| self.normals[*row].to_vec()).collect();
+            let found = least_squares::solve(&normals, &slope);
+            let independent = found.rank == rows.len();
+            let balances = found.removed >= (1.0 - BALANCED * BALANCED) * dot(slope, slope);
+            let strongest = found
+                .values
+                .iter()
+                .fold(0.0_f64, |most, v| most.max(v.abs()));
+            let mut each = rows.iter().zip(&found.values);
+            let push = each
+                .all(|(row, value)| *value >= -BALANCED * strongest || problem.is_equality(*row));
+            if independent && balances && push {
                 let own = rows.iter().position(|other| *other == row);
-                let own = own.map_or(0.0, |k| found[k].max(0.0));
+                let own = own.map_or(0.0, |k| found.values[k].max(0.0));
                 least = Some(least.map_or(own, |least| least.min(own)));
             }
         }
@@ -99,8 +97,6 @@ const SHORTEST: f64 = 1e-10;
 pub(crate) const FEASIBLE: f64 = 1e-10;
 /// Rows whose sets are tried for the least multipliers.
 const MOST_ACTIVE: usize = 8;
-/// Normals are independent above this share of their size.
-const INDEPENDENT: f64 = 1e-6;
 /// How far a slope may be from the rows that balance it, relative.
 const BALANCED: f64 = 1e-6;
 /// A row this close to its limit is active.
