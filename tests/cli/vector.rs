@@ -56,6 +56,41 @@ fn static_currents_for_a_vector_trade_what_is_noticed() {
     assert!(low > 0.0 && low <= high && high < 1.1 * low, "{low} {high}");
 }
 
+/// The row and the page had the sideways force that feedback of the upward component leaves.
+#[test]
+fn regression_feedback_of_a_vector_had_the_sideways_force_of_another() {
+    let place = Place::new();
+    let upward = wedge(&place, "").replace("small", "upward");
+    let text = String::from_utf8(place.read("small_wedge.toml")).unwrap();
+    place.write(
+        &upward,
+        &text
+            .replace("vertical-only", "vertical")
+            .replace("name = \"wedge\"", "name = \"upward\""),
+    );
+    let command = [
+        "calibrate",
+        SEED,
+        "small_wedge.toml",
+        &upward,
+        "--out",
+        "out",
+    ];
+    let report = place.run(&command).ends(0);
+    let rows = report
+        .out
+        .lines()
+        .filter(|line| line.contains("  with feedback"));
+    // Off by, upward and its range; sideways in between.
+    let shares: Vec<usize> = rows.map(|row| row.matches('%').count()).collect();
+    assert_eq!(shares, [3, 4], "{}", report.out);
+    for (shape, says) in [("wedge", false), ("upward", true)] {
+        let page = place.read(&format!("out/seed_air/{shape}/report.html"));
+        let page = String::from_utf8(page).unwrap();
+        assert_eq!(page.contains("degrees off; with feedback"), says, "{shape}");
+    }
+}
+
 #[test]
 fn two_fingers_are_somewhere_else_and_get_their_share() {
     let place = Place::new();

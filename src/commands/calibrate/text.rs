@@ -68,11 +68,11 @@ pub fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> Stri
 
 /// The force of every shape against the requested one, with static currents and with feedback.
 fn force_table(report: &CalibrateReport) -> String {
-    let files = report.bundles.iter().map(|bundle| &bundle.lambda.file);
-    headed_table(files.flat_map(force_rows))
+    headed_table(report.bundles.iter().flat_map(force_rows))
 }
 
-fn force_rows(file: &LambdaFile) -> Vec<Vec<(&'static str, String)>> {
+fn force_rows(bundle: &BundleReport) -> Vec<Vec<(&'static str, String)>> {
+    let file = &bundle.lambda.file;
     let headline = file.headline.as_ref();
     let felt = headline.and_then(|of| of.felt.as_ref()).map(|of| of.total);
     let sideways = file.sideways.as_ref();
@@ -84,10 +84,12 @@ fn force_rows(file: &LambdaFile) -> Vec<Vec<(&'static str, String)>> {
         degrees: sideways.map(|of| of.static_median_deg),
         given: headline.and_then(|of| of.static_currents),
     };
+    // That of the upward force alone: where a vector is requested, `off by` has all there is.
+    let of_upward = sideways.filter(|_| bundle.manifest.force.is_none());
     let feedback = ForceRow {
         shape: "  with feedback".to_owned(),
         off_by: felt.map(|of| of.feedback),
-        sideways: sideways.map(|of| of.feedback_share),
+        sideways: of_upward.map(|of| of.feedback_share),
         given: headline.and_then(|of| of.feedback),
         ..ForceRow::default()
     };

@@ -133,7 +133,7 @@ fn answer(object: &CalibratedObject) -> Section {
             format!("of {} requested there", force(at.wanted_n))
         });
         tile(&mut body, "worst error", &force(worst_n), &at);
-        given(&mut body, file);
+        given(&mut body, object);
     }
     body.raw("</dl>");
     Section {
@@ -162,7 +162,8 @@ fn array(plot: &ArrayPlot) -> Section {
 }
 
 /// The force that the static currents give: its share of the requested one, and its direction.
-fn given(body: &mut Html, file: &LambdaFile) {
+fn given(body: &mut Html, object: &CalibratedObject) {
+    let file = object.lambda;
     if let Some(given) = &file.given_force {
         let limits = format!(
             "{} to {} over the points{}",
@@ -177,16 +178,14 @@ fn given(body: &mut Html, file: &LambdaFile) {
         tile(body, "given force", &percent(given.mean), &limits);
     }
     if let Some(sideways) = &file.sideways {
-        tile(
-            body,
-            "sideways force",
-            &percent(sideways.static_share),
-            &format!(
-                "of the push, {} degrees off; with feedback {}",
-                figures(sideways.static_median_deg, 2),
-                percent(sideways.feedback_share)
-            ),
-        );
+        let degrees = figures(sideways.static_median_deg, 2);
+        let mut more = format!("of the push, {degrees} degrees off");
+        // Feedback of a vector gives the sideways force that is requested.
+        if object.manifest.force.is_none() {
+            more += &format!("; with feedback {}", percent(sideways.feedback_share));
+        }
+        let share = percent(sideways.static_share);
+        tile(body, "sideways force", &share, &more);
     }
     if let Some(heat) = &file.hottest_coil {
         let celsius = |c: f64| format!("{} C", figures(c, 3));
