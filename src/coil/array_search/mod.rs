@@ -12,3 +12,4 @@ pub mod space;
 pub mod study;
 #[cfg(test)]
 mod tests;
+pub mod worth;

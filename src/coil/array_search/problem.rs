@@ -142,11 +142,14 @@ impl Bounded {
         }
     }
 
-    /// By how much the excess falls with a unit more of the limit.
+    /// The same limit, relaxed by this share of it, or of the scale of differences.
     #[must_use]
-    pub fn per_unit(&self) -> f64 {
-        let up = if self.at_least { -1.0 } else { 1.0 };
-        up / self.scale.unwrap_or(self.limit)
+    pub fn relaxed(&self, share: f64) -> Self {
+        let by = share * self.scale.unwrap_or(self.limit.abs());
+        Self {
+            limit: self.limit + if self.at_least { -by } else { by },
+            ..*self
+        }
     }
 
     /// By how much the limit is broken: above 0 where it is.

@@ -15,28 +15,8 @@ use fluxform_numerics::mixed_search::{Sample, Search, Values};
 
 use super::problem::{ArrayProblem, Bounded, Physical};
 use super::search::{Candidate, Found};
+use super::worth::{LimitWorth, worths};
 use crate::limits::LimitName;
-
-/// A limit of the best array.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LimitWorth {
-    /// Its key.
-    pub key: &'static str,
-    /// The array's value, in the unit of its key.
-    pub value: f64,
-    /// The limit.
-    pub limit: f64,
-    /// Whether it is met.
-    pub met: bool,
-    /// Whether more of it would give a larger objective.
-    pub active: bool,
-    /// By how much the objective would grow for one unit more of it, relative and to first order, by
-    /// the surrogate.
-    pub gain_per_unit: f64,
-    /// Which, where it is one of the design's.
-    #[serde(skip)]
-    pub name: Option<LimitName>,
-}
 
 /// The gain from a variable, and how far it may move.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -128,8 +108,6 @@ const TIMES_BETTER: usize = 3;
 const LOSS: f64 = 0.01;
 /// Weight of a range's width: limits' multipliers stay below the penalty for variables this flat.
 const FLATTEST: f64 = 0.02;
-/// Multipliers below this are rounding.
-const ACTIVE: f64 = 1e-4;
 /// Parts of the best design's mass, heat and time for which the best is computed, from the nearest on.
 const PARTS: [&[f64]; 2] = [&[0.92, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25], &[1.15, 1.4]];
 /// Descents in turn that gain less than this are the last.
@@ -228,7 +206,7 @@ fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interru
     let Some(mut view) = View::new(found.problem, search, best, effort) else {
         return Ok(Study::default());
     };
-    let limits = view.limits();
+    let limits = worths(view.problem, &view.surrogate, &view.best);
     let variables = view.variables(design)?;
     let neighbours = view.neighbours()?;
     view.trade(&here)?;
@@ -360,35 +338,6 @@ impl<'s, 'a> View<'s, 'a> {
             physical.as_ref(),
             &self.problem.bounds(x, physical.as_ref()),
         )
-    }
-
-    fn limits(&self) -> Vec<LimitWorth> {
-        let best = &self.best;
-        let whole = self.problem.space.variables().iter().enumerate();
-        let whole = whole.filter(|(_, variable)| variable.values != Values::Continuous);
-        let fixed: Vec<_> = whole.map(|(index, _)| (index, best.x[index])).collect();
-        let judge = |x: &[f64], outputs: &[f64]| self.judge(x, outputs);
-        let ended = self
-            .search
-            .climb_otherwise(&self.surrogate, &judge, &best.x, &fixed);
-        let multipliers = ended.map_or_else(Vec::new, |(_, ended)| ended.multipliers);
-        let worth = |(index, bound): (usize, &Bounded)| {
-            let multiplier = multipliers.get(index).copied().unwrap_or(0.0);
-            LimitWorth {
-                key: bound.key,
-                value: bound.value,
-                limit: bound.limit,
-                met: bound.is_met(),
-                active: multiplier > ACTIVE,
-                gain_per_unit: if multiplier > ACTIVE {
-                    multiplier * bound.per_unit()
-                } else {
-                    0.0
-                },
-                name: bound.name,
-            }
-        };
-        best.bounds.iter().enumerate().map(worth).collect()
     }
 
     /// The objective of a design that is evaluated for it, where it meets the limits.

@@ -449,3 +449,54 @@ fn regression_the_trade_offs_were_estimates() {
         );
     }
 }
+
+/// What a limit is worth was the multiplier of the bore alone, at the best's layers and turns: several times what a search
+/// under the larger limit gains.
+#[test]
+fn regression_a_limit_was_worth_several_times_what_more_of_it_gave() {
+    let merit = |design: &Design, studied: bool| {
+        let all = problems(design, &request(), &[1.0], &OnAxis).expect("a search");
+        let mut found = run(&all, design, &request())
+            .expect("not interrupted")
+            .expect("a design");
+        let limits = match studied {
+            true => study(&mut found, design).expect("not interrupted").limits,
+            false => Vec::new(),
+        };
+        (found.best.physical.merits[0], limits)
+    };
+    let resistance = |most_ohm: f64| {
+        let mut design = design(ONE_COIL);
+        design.limits.resistance_max_ohm = Some(most_ohm);
+        design
+    };
+    let outer = |most_mm: f64| {
+        let range = format!("[5.0, {most_mm:?}]");
+        design(&ONE_COIL.replace("[5.0, 38.0]", &range))
+    };
+    let cases: [(&str, [Design; 3]); 2] = [
+        ("resistance_ohm", [6.0, 6.3, 6.9].map(resistance)),
+        (
+            "search.coil.outer_diameter_mm",
+            [14.0, 14.5, 15.5].map(outer),
+        ),
+    ];
+    let shares = [[0.05, 0.15], [0.5 / 14.0, 1.5 / 14.0]];
+    for ((key, [given, more @ ..]), shares) in cases.iter().zip(shares) {
+        let (now, limits) = merit(given, true);
+        // Not the limit of the outer diameter, where that coincides with the end of its range.
+        let active: Vec<_> = limits.iter().filter(|one| one.active).collect();
+        let [worth] = active[..] else {
+            panic!("{active:?} hold it back")
+        };
+        assert_eq!(worth.key, *key);
+        for (more, share) in more.iter().zip(shares) {
+            let gained = merit(more, false).0 / now - 1.0;
+            let ratio = worth.gain_per_unit * share * worth.limit / gained;
+            assert!(
+                (1.0 / 1.5..1.5).contains(&ratio),
+                "{key} {share}: {gained} {ratio}"
+            );
+        }
+    }
+}

@@ -159,6 +159,10 @@ pub fn words(name: &str) -> (String, &'static str) {
         ("_n", "N"),
         ("_h", "H"),
     ];
+    // A key of a document is printed as a user writes it.
+    if name.contains('.') {
+        return (name.to_owned(), "");
+    }
     let found = units
         .into_iter()
         .find_map(|(end, unit)| name.strip_suffix(end).map(|stem| (stem, unit)));

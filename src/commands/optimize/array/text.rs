@@ -7,7 +7,8 @@ use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::limit_row;
 use crate::cli::quantity::{count, number, percent, si};
 use crate::cli::values::FileArgument;
-use crate::coil::array_search::study::{LimitWorth, Study};
+use crate::coil::array_search::study::Study;
+use crate::coil::array_search::worth::LimitWorth;
 
 pub fn summary(
     result: &ArrayOptimization,
