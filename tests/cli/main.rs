@@ -18,6 +18,7 @@ mod messages;
 mod mistakes;
 mod optimize;
 mod optimize_array;
+mod optimize_choices;
 mod optimize_limits;
 mod placement;
 mod scan;

@@ -104,11 +104,9 @@ impl Candidate {
     }
 }
 
-/// A choice of layout, magnet and core, and the best array of it that was computed.
+/// What has no order in a search: layout, magnet, core and plate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SearchedChoice {
-    /// Coils of the array.
-    pub coils: usize,
+pub struct ArrayChoice {
     /// Rows and columns; null where the positions are the design's own.
     pub rows_columns: Option<[usize; 2]>,
     /// How they lie; null where that is as given.
@@ -119,6 +117,30 @@ pub struct SearchedChoice {
     pub core: bool,
     /// Whether there is a plate.
     pub plate: bool,
+}
+
+impl ArrayChoice {
+    /// That of a space.
+    pub(super) fn of(space: &Space) -> Self {
+        let base = space.base();
+        Self {
+            rows_columns: space.layout().map(|(_, counts)| counts),
+            layout: space.layout().map(|(layout, _)| layout.into()),
+            magnet_m: [base.magnet.diameter_m, base.magnet.length_m],
+            core: base.core.is_some(),
+            plate: base.plate.is_some(),
+        }
+    }
+}
+
+/// A choice of layout, magnet and core, and the best array of it that was computed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchedChoice {
+    /// Coils of the array.
+    pub coils: usize,
+    /// What it is.
+    #[serde(flatten)]
+    pub choice: ArrayChoice,
     /// Arrays of it that were computed.
     pub evaluations: usize,
     /// The largest objective within the limits; null where none was met. At the accuracy of the search where this choice
@@ -139,14 +161,9 @@ impl SearchedChoice {
             space.named(&problem.made(&sample.x))
         });
         let met = best.filter(|(_, judged)| judged.excess() <= MET);
-        let magnet = &space.base().magnet;
         Self {
             coils: space.coils(),
-            rows_columns: space.layout().map(|(_, counts)| counts),
-            layout: space.layout().map(|(layout, _)| layout.into()),
-            magnet_m: [magnet.diameter_m, magnet.length_m],
-            core: space.base().core.is_some(),
-            plate: space.base().plate.is_some(),
+            choice: ArrayChoice::of(space),
             evaluations: search.samples().len(),
             objective: met.map(|(_, judged)| judged.objective().exp()),
             values,

@@ -14,7 +14,7 @@ use fluxform_numerics::mixed_search::surrogate::Surrogate;
 use fluxform_numerics::mixed_search::{Sample, Search, Values};
 
 use super::problem::{ArrayProblem, Bounded, Physical};
-use super::search::{Candidate, Found};
+use super::search::{ArrayChoice, Candidate, Found};
 use super::worth::{LimitWorth, worths};
 use crate::limits::LimitName;
 
@@ -59,6 +59,9 @@ pub struct FrontPoint {
     pub objective: f64,
     /// Coils of the array.
     pub coils: usize,
+    /// Of which choice it is.
+    #[serde(flatten)]
+    pub choice: ArrayChoice,
     /// The variables by key.
     pub values: BTreeMap<String, f64>,
 }
@@ -94,6 +97,7 @@ pub struct TradedDesign {
     /// Whether it does but for that of each quantity.
     met_but: [bool; 3],
     coils: usize,
+    choice: ArrayChoice,
     values: BTreeMap<String, f64>,
     /// Of which search it is a sample, the best choice's first, and its variables there.
     source: usize,
@@ -229,6 +233,7 @@ fn surroundings(found: &mut Found<'_>, design: &Design) -> Result<Study, Interru
             value: designs[*index].costs[cost],
             objective: designs[*index].objective,
             coils: designs[*index].coils,
+            choice: designs[*index].choice.clone(),
             values: designs[*index].values.clone(),
         }));
     }
@@ -295,6 +300,7 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
         let judged = problem.judged(Some(&physical), &bounds);
         Some(TradedDesign {
             coils: problem.space.coils(),
+            choice: ArrayChoice::of(&problem.space),
             objective: judged.objective().exp(),
             costs: [mass, power, settling],
             met: bounds.iter().all(Bounded::is_met),

@@ -144,17 +144,18 @@ fn trade_offs(result: &ArrayOptimization) -> Option<Section> {
             .raw("</figure>");
     }
     body.raw("</div>");
-    let row = |choice: &SearchedChoice| -> Vec<Cell> {
+    let row = |searched: &SearchedChoice| -> Vec<Cell> {
+        let choice = &searched.choice;
         let lies = match (choice.rows_columns, choice.layout) {
             (Some([rows, columns]), Some(layout)) => format!("{rows} x {columns}, {layout}"),
             (None, _) | (_, None) => "as given".to_owned(),
         };
         let magnet = choice.magnet_m.map(|m| figures(m * 1e3, 4)).join(" x ");
-        let gain = choice
+        let gain = searched
             .objective
             .map_or_else(|| "limits not met".to_owned(), |g| figures(g, 4));
         vec![
-            choice.coils.to_string().into(),
+            searched.coils.to_string().into(),
             lies.into(),
             format!("{magnet} mm").into(),
             if choice.core { "yes" } else { "no" }.into(),

@@ -1,0 +1,53 @@
+//! `optimize --for`: choices without an order.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::SEED;
+use fluxform_testing::place::Place;
+
+const FLAT: &str = "shapes/flat.toml";
+
+/// The columns were the best array's variables, and none named the choice: rows of another one could not be rebuilt.
+#[test]
+fn regression_rows_of_the_front_lacked_their_choice_and_its_variables() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("rows = 3", "rows = 2")
+        .replace("columns = 3", "columns = 2");
+    let vary = "[search]\narray.layout = [\"grid\", \"shifted\"]\narray.move_mm = [-1.5, 1.5]\n";
+    let text = text.replace("resistance_max_ohm = 6.0", "resistance_max_ohm = 7.0");
+    place.write("layouts.toml", &format!("{text}\n{vary}"));
+    let mut arguments = vec!["optimize", "layouts.toml", "--for", FLAT];
+    arguments.extend(["--evaluations", "12", "--starts", "1", "--format", "json"]);
+    arguments.extend(["--front", "trade.csv"]);
+    let result = place.run(&arguments).ends(0).json();
+    let table = place.text("trade.csv");
+    let mut lines = table.lines().map(|line| line.split(','));
+    let head: Vec<&str> = lines.next().expect("a head").collect();
+    let rows: Vec<BTreeMap<&str, &str>> = lines
+        .map(|row| head.iter().copied().zip(row).collect())
+        .collect();
+    let best: Vec<&String> = result["values"].as_object().unwrap().keys().collect();
+    assert_eq!(&head[4..4 + best.len()], &best[..], "{head:?}");
+    let choices = result["choices"].as_array().unwrap();
+    assert_eq!(choices.len(), 2);
+    for choice in choices {
+        let values = choice["values"].as_object().unwrap();
+        let row = rows.iter().find(|row| {
+            row["quantity"] == "coils" && row["array.layout"] == choice["layout"].as_str().unwrap()
+        });
+        let row = row.expect("a row of every choice");
+        for key in head.iter().filter(|key| key.contains(".move_")) {
+            let value = values.get(*key).and_then(Value::as_f64);
+            assert_eq!(row[key].parse().ok(), value, "{key} {row:?}");
+        }
+        assert!(values.keys().all(|key| head.contains(&key.as_str())));
+        let rest = ["array.rows", "array.columns", "core", "plate"].map(|key| row[key]);
+        assert_eq!(rest, ["2", "2", "false", "false"]);
+    }
+    let front = result["study"]["front"].as_array().unwrap();
+    assert!(front.iter().all(|point| point["layout"].is_string()));
+}
