@@ -66,7 +66,7 @@ pub fn closest(positions: &[[f64; 2]]) -> f64 {
 
 type Matrix = [[f64; 2]; 2];
 
-/// A direction in which coils move alike: each coil's own part of a move by 1.
+/// A direction in which coils move alike: each coil's own part of a move by 1, which is the larger of those along x and y.
 pub type Mode = Vec<[f64; 2]>;
 
 /// The moves that keep the symmetry, as far as the positions have it.
@@ -109,7 +109,8 @@ pub fn modes(positions: &[[f64; 2]], symmetry: Symmetry) -> Vec<Mode> {
                     mode[images[first]][axis] += part[axis];
                 }
             }
-            let size = mode[first][0].hypot(mode[first][1]);
+            // A move's range holds along x and y, on a diagonal too.
+            let size = mode[first][0].abs().max(mode[first][1].abs());
             if size <= SAME {
                 continue;
             }
@@ -178,12 +179,35 @@ mod tests {
         assert_eq!(modes(&oblong, Symmetry::Square).len(), 3);
         for mode in modes(&places, Symmetry::Square) {
             assert_eq!(mode[4], [0.0, 0.0]);
+            assert!(
+                mode.iter()
+                    .flatten()
+                    .all(|part| [-1.0, 0.0, 1.0].contains(part))
+            );
             let moved: Vec<_> = places
                 .iter()
                 .zip(&mode)
                 .map(|(p, d)| [p[0] + 0.1 * d[0], p[1] + 0.1 * d[1]])
                 .collect();
             assert_eq!(modes(&moved, Symmetry::Square).len(), 2, "{mode:?}");
+        }
+    }
+
+    /// Coils on a diagonal moved by the square root of half the range.
+    #[test]
+    fn regression_coils_on_a_diagonal_did_not_reach_the_ends_of_their_range() {
+        for (kind, symmetry) in [
+            (SearchLayout::Grid, Symmetry::Square),
+            (SearchLayout::Ring, Symmetry::Square),
+            (SearchLayout::Shifted, Symmetry::Mirrored),
+        ] {
+            for mode in modes(&layout(kind, 3, 3), symmetry) {
+                let far = mode
+                    .iter()
+                    .flatten()
+                    .fold(0.0_f64, |far, x| far.max(x.abs()));
+                assert_eq!(far, 1.0, "{kind:?} {mode:?}");
+            }
         }
     }
 }
