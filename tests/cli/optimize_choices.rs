@@ -1,4 +1,4 @@
-//! `optimize --for`: choices without an order.
+//! `optimize --for`: choices without an order, and given arrays that no search begins at.
 
 use std::collections::BTreeMap;
 
@@ -50,4 +50,23 @@ fn regression_rows_of_the_front_lacked_their_choice_and_its_variables() {
     }
     let front = result["study"]["front"].as_array().unwrap();
     assert!(front.iter().all(|point| point["layout"].is_string()));
+}
+
+/// A constant that is 0 was taken for an array that renders nothing.
+#[test]
+fn regression_an_array_without_a_maxmin_was_said_to_render_nothing() {
+    let place = Place::new();
+    let text = place
+        .text(SEED)
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 1");
+    place.write("one.toml", &text);
+    let mut arguments = vec!["optimize", "one.toml", "--for", FLAT];
+    arguments.extend(["--vary", "coil.inner_diameter_mm=6:30"]);
+    arguments.extend(["--constant", "maxmin"]);
+    place.run(&arguments).ends(3).says(&[
+        "lambda_maxmin of the given design is 0 for flat",
+        "though its lambda_jnd is ",
+        "choose another --constant, like jnd",
+    ]);
 }

@@ -224,10 +224,16 @@ fn before(
     let rendered = |level| -> Result<Physical, RunError> {
         let physical = physics.rendered_or_why(design, 0.0, level)?;
         progress.advance(1);
-        physical.map_err(|nothing| {
-            let name = &shapes[nothing.shape].document.name;
-            RunError::Input(nothing_rendered(name, physics.aim().constant, nothing.why))
-        })
+        match physical {
+            Ok(physical) => Ok(physical),
+            Err(nothing) => {
+                let shape = &shapes[nothing.shape];
+                let other = other_constant(design, shape, physics)?;
+                let name = &shape.document.name;
+                let why = nothing_rendered(name, physics.aim().constant, nothing.why, other);
+                Err(RunError::Input(why))
+            }
+        }
     };
     // Full accuracy first: points are named by their number in the shape.
     let full = rendered(Level::Full)?;
@@ -237,14 +243,56 @@ fn before(
     })
 }
 
-/// Why a search cannot begin at a design that renders nothing of a shape.
-fn nothing_rendered(shape: &str, constant: Constant, why: Option<NoLambda>) -> String {
-    match (constant, why) {
-        (Constant::Other(OtherAim::Vector), Some(why)) => format!(
-            "the given design renders no force without a sideways part for {shape} ({why}), so there is nothing to \
+/// Another force constant that `design` has for `shape`, and its value, N/m.
+fn other_constant(
+    design: &Design,
+    shape: &ShapeSource,
+    physics: &ArrayPhysics,
+) -> Result<Option<(Criterion, f64)>, RunError> {
+    let known = physics.aim().constant;
+    let others = [Criterion::Jnd, Criterion::Saturation].into_iter();
+    for criterion in others.filter(|other| known != Constant::Static(*other)) {
+        let aim = Aim {
+            constant: criterion.into(),
+            at_n_per_m: None,
+            ..physics.aim()
+        };
+        let alone = std::slice::from_ref(shape);
+        let tolerance = physics.tolerance(Level::Full, design);
+        let all = ArrayPhysics::new(alone, aim, tolerance, &Silent)?;
+        if let Some(rendered) = all.rendered(design, 0.0, Level::Full)? {
+            return Ok(Some((criterion, rendered.merits[0])));
+        }
+    }
+    Ok(None)
+}
+
+/// Why a search cannot begin at a design that has no such constant for a shape, or only an `other` one.
+fn nothing_rendered(
+    shape: &str,
+    constant: Constant,
+    why: Option<NoLambda>,
+    other: Option<(Criterion, f64)>,
+) -> String {
+    let because = why.map_or_else(String::new, |why| format!(" ({why})"));
+    match (constant, other) {
+        (Constant::Other(OtherAim::Vector), _) if why.is_some() => format!(
+            "the given design renders no force without a sideways part for {shape}{because}, so there is nothing to \
              compare with: let currents flow both ways (supply.current_min_a below 0), or add coils"
         ),
-        _ => Refused::NothingRendered(shape.to_owned()).to_string(),
+        (
+            Constant::Static(_) | Constant::Other(OtherAim::Feedback),
+            Some((other, lambda_n_per_m)),
+        ) => format!(
+            "lambda_{} of the given design is 0 for {shape}{because}, so there is nothing to compare with, though its \
+             lambda_{} is {lambda_n_per_m:.3} N/m: choose another --constant, like {1}, or begin at an array whose \
+             lambda_{0} is above 0",
+            constant.name(),
+            other.name()
+        ),
+        (Constant::Static(_) | Constant::Other(_), _) => {
+            Refused::NothingRendered(shape.to_owned()).to_string()
+        }
     }
 }
 

@@ -67,6 +67,15 @@ impl Constant {
     /// The least error at a given force constant, no force constant itself.
     pub const ERROR: Self = Self::Other(OtherAim::Error);
 
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Static(criterion) => criterion.name(),
+            Self::Other(aim) => aim.into(),
+        }
+    }
+
     /// The static constant, where it is one.
     fn criterion(self) -> Option<Criterion> {
         match self {
