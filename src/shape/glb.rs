@@ -24,6 +24,11 @@ const UPWARDS: Affine = Affine {
     shift: [0.0; 3],
 };
 
+/// The version of glTF that is read: major and minor.
+const VERSION: [u32; 2] = [2, 0];
+/// Characters of a version that a message shows.
+const LONGEST_VERSION: usize = 20;
+
 /// True for bytes that begin as GLB files do.
 pub(crate) fn begins(bytes: &[u8]) -> bool {
     bytes.starts_with(b"glTF")
@@ -46,6 +51,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         ReadError::file(format!("the GLB file is damaged: {text}"))
     };
     let root: Value = serde_json::from_slice(json).map_err(|error| damaged(error.to_string()))?;
+    check_version(&root).map_err(ReadError::file)?;
     let mut warnings = extensions::check(&root).map_err(ReadError::file)?;
     let mut root: Root = serde_json::from_value(extensions::surface_alone(root))
         .map_err(|error| damaged(error.to_string()))?;
@@ -95,6 +101,27 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         warnings,
         ..laid_out
     })
+}
+
+/// Refuses documents that need another glTF than 2.0: a later 2.x is read unless it states that 2.0 does not do, and
+/// so is a later major that states that 2.0 does. A document without a version is damaged, which is found later.
+fn check_version(root: &Value) -> Result<(), String> {
+    let stated = |key: &str| root["asset"][key].as_str();
+    let parsed = |version: &str| -> Option<[u32; 2]> {
+        let (major, minor) = version.split_once('.')?;
+        Some([major.parse().ok()?, minor.parse().ok()?])
+    };
+    let (least, version) = (stated("minVersion"), stated("version"));
+    let refused = match (least, version) {
+        (Some(least), _) if parsed(least).is_none_or(|v| v > VERSION) => least,
+        (None, Some(version)) if parsed(version).is_none_or(|v| v[0] != VERSION[0]) => version,
+        (Some(_), Some(version)) if parsed(version).is_none_or(|v| v[0] < VERSION[0]) => version,
+        _ => return Ok(()),
+    };
+    let refused: String = refused.chars().take(LONGEST_VERSION).collect();
+    Err(format!(
+        "the GLB file needs glTF `{refused}`, which is not read: export it again as glTF 2.0"
+    ))
 }
 
 /// Refuses meshes that morph targets bend as they are at rest.

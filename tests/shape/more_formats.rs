@@ -381,6 +381,34 @@ fn sparse_data_of_glb_are_named_as_what_they_are() {
     assert!(message.contains("sparse"), "{message}");
 }
 
+/// A document that needs glTF 3 was read as if it were 2.0.
+#[test]
+fn a_glb_file_that_needs_another_version_is_refused() {
+    let with = |asset: &str| glb_with("{\"version\":\"2.0\"}", asset);
+    for (asset, named) in [
+        (r#"{"version":"2.0","minVersion":"3.0"}"#, "`3.0`"),
+        (r#"{"version":"2.1","minVersion":"2.1"}"#, "`2.1`"),
+        (r#"{"version":"2.0","minVersion":"two"}"#, "`two`"),
+        (r#"{"version":"3.0"}"#, "`3.0`"),
+        (r#"{"version":"1.0"}"#, "`1.0`"),
+        (r#"{"version":"1.0","minVersion":"1.0"}"#, "`1.0`"),
+    ] {
+        let message = refusal(SurfaceFormat::Glb, &with(asset));
+        assert!(
+            message.contains(named) && message.contains("export it again as glTF 2.0"),
+            "{message}"
+        );
+    }
+    for asset in [
+        r#"{"version":"2.1"}"#,
+        r#"{"version":"2.0","minVersion":"2.0"}"#,
+        r#"{"version":"2.10","minVersion":"2.0"}"#,
+        r#"{"version":"3.0","minVersion":"2.0"}"#,
+    ] {
+        assert!(read(SurfaceFormat::Glb, &with(asset)).is_ok(), "{asset}");
+    }
+}
+
 /// Every required extension was called damage, the harmless ones too.
 #[test]
 fn required_extensions_of_glb_are_passed_or_named_with_advice() {
