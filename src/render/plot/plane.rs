@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use kuva::plot::{ColorMap, Heatmap, LegendEntry, LegendShape, QuiverPlot, ScatterPlot};
 use kuva::render::figure::Figure;
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 
 use super::drawing::Drawing;
@@ -140,14 +140,20 @@ impl PlanePlot {
             let arrows = QuiverPlot::new().with_arrows(drawn.collect::<Vec<_>>());
             plots.push(Plot::Quiver(arrows.with_color(colour)));
         }
+        // A colour bar of one value has no ticks.
+        let single = panel.cells.as_ref().and_then(single);
+        let title = match single {
+            Some(value) => format!("{} (all {})", panel.title, TickFormat::Auto.format(value)),
+            None => panel.title.clone(),
+        };
         let mut layout = Layout::new(x, y)
-            .with_title(panel.title.clone())
+            .with_title(title)
             .with_title_size(TITLE_PX)
             .with_x_label(format!("x / {}", self.unit))
             .with_y_label(format!("y / {}", self.unit))
             .with_ticks(5)
             .with_equal_aspect();
-        layout.show_colorbar = panel.cells.is_some();
+        layout.show_colorbar = panel.cells.is_some() && single.is_none();
         (plots, layout)
     }
 
@@ -191,6 +197,13 @@ pub(super) fn wide([low, high]: [f64; 2]) -> (f64, f64) {
         let half = 0.5 * low.abs().max(1.0);
         (low - half, low + half)
     }
+}
+
+/// The value of all cells, where it is the same.
+fn single(cells: &Cells) -> Option<f64> {
+    let mut values = cells.values.iter().flatten().copied();
+    let first = values.next()?;
+    values.all(|value| value == first).then_some(first)
 }
 
 /// At most [`MOST_CELLS`] a side.
@@ -274,6 +287,29 @@ mod tests {
         }
         assert!(!svg.contains("NaN"));
         assert!(svg == drawing(9, 7).drawing().svg());
+    }
+
+    /// A colour bar without ticks stood beside cells of one value.
+    #[test]
+    fn the_value_that_all_cells_have_is_printed_in_place_of_a_colour_bar() {
+        let titled = |value: Option<f64>| {
+            let mut plot = drawing(9, 7);
+            let cells = plot.panels[0].cells.as_mut().unwrap();
+            for cell in cells.values.iter_mut().flatten() {
+                *cell = value.unwrap_or(*cell);
+            }
+            plot.drawing().svg()
+        };
+        let bar = titled(None).matches("<rect").count();
+        for (value, title) in [
+            (0.0, "heights / mm (all 0)<"),
+            (1.3, "heights / mm (all 1.3)<"),
+        ] {
+            let svg = titled(Some(value));
+            assert!(svg.contains(title), "{value}");
+            assert!(svg.matches("<rect").count() < bar, "{value}");
+        }
+        assert!(titled(None).contains("heights / mm<"));
     }
 
     #[test]

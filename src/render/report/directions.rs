@@ -19,6 +19,9 @@ const LONGEST: f64 = 1.6;
 /// Smaller angles are rounding, degrees.
 const NOTHING_DEG: f64 = 1e-6;
 
+/// Smaller sideways forces are rounding, of the largest.
+const NOTHING: f64 = 1e-9;
+
 /// One kind of given force.
 type Given = fn(&DirectionCell) -> [f64; 3];
 
@@ -30,11 +33,7 @@ const GIVEN: [(&str, Given); 2] = [
 /// The drawing.
 pub(super) fn plot(object: &CalibratedObject, field: &DirectionField) -> PlanePlot {
     let panel = |(name, given): (&str, Given)| {
-        let angle = |cell: &Option<DirectionCell>| {
-            let angle = angle_deg(cell.as_ref()?.requested_n, given(cell.as_ref()?));
-            // Rounding would get a scale of its own.
-            Some(if angle > NOTHING_DEG { angle } else { 0.0 })
-        };
+        let angle = |cell: &Option<DirectionCell>| Some(error_deg(cell.as_ref()?, given));
         Panel {
             title: format!("{name}: error of the direction / degrees"),
             cells: Some(Cells {
@@ -61,6 +60,13 @@ pub(super) fn plot(object: &CalibratedObject, field: &DirectionField) -> PlanePl
     }
 }
 
+/// The angle between the requested force and the one given, degrees; rounding, which would get a scale of its
+/// own, is none.
+fn error_deg(cell: &DirectionCell, given: Given) -> f64 {
+    let angle = angle_deg(cell.requested_n, given(cell));
+    if angle > NOTHING_DEG { angle } else { 0.0 }
+}
+
 /// The sideways parts as arrows, all panels' to one scale.
 fn arrows(field: &DirectionField, name: &'static str, of: Given) -> Arrows {
     let rows = field.cells.len() / field.columns.max(1);
@@ -85,9 +91,14 @@ fn arrows(field: &DirectionField, name: &'static str, of: Given) -> Arrows {
     let one = |cell: &DirectionCell| {
         let [x, y, _] = cell.position_m;
         let force = of(cell);
+        let drawn_mm_per_n = match sideways(force) > NOTHING * longest_n {
+            true => mm_per_n,
+            // An arrow's head is seen however short it is.
+            false => 0.0,
+        };
         (
             [1e3 * x, 1e3 * y],
-            [mm_per_n * force[0], mm_per_n * force[1]],
+            [drawn_mm_per_n * force[0], drawn_mm_per_n * force[1]],
         )
     };
     Arrows {
@@ -149,7 +160,7 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
     let mut body = Html::default();
     let median = |given: Given| {
         let cells = field.cells.iter().flatten();
-        let angles = cells.map(|cell| angle_deg(cell.requested_n, given(cell)));
+        let angles = cells.map(|cell| error_deg(cell, given));
         let mut angles: Vec<f64> = angles.collect();
         angles.sort_by(f64::total_cmp);
         angles.get(angles.len() / 2).copied().unwrap_or(0.0)
@@ -167,9 +178,9 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
             figures(following, 3)
         ),
     );
-    body.raw("<figure>")
-        .raw(&plot(object, field).drawing().svg())
-        .raw("</figure>");
+    body.raw("<figure><div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Drawing\">")
+        .raw(&plot(object, field).drawing().markup())
+        .raw("</div></figure>");
     Some(Section {
         id: "directions",
         title: "Where the force points",

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use fluxform_base::force_direction::ForceDirection;
 use fluxform_bundle::lambda_file::LambdaFile;
-use fluxform_bundle::manifest::Manifest;
+use fluxform_bundle::manifest::{ForceSummary, Manifest};
 use fluxform_bundle::npz::{MapArrays, Runtime};
 use fluxform_bundle::table::PointRow;
 use fluxform_coil::limits::LimitCheck;
 use serde_json::{Value, from_value, json};
 
-use super::page;
+use super::{directions, page};
 use crate::plot::lambda::{ChosenForces, ErrorMap, LambdaPlot};
-use crate::report::data::{CalibratedObject, CoilPlan, ErrorTime};
+use crate::report::data::{CalibratedObject, CoilPlan, DirectionCell, DirectionField, ErrorTime};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\u{202e}\u{0}\"'&<!--";
@@ -205,6 +206,40 @@ impl Parts {
             }),
         }
     }
+}
+
+/// The drawing had a size of its own, and the page scrolled sideways; rounding got a number and arrows.
+#[test]
+fn the_drawing_of_directions_takes_the_size_of_the_page_and_shows_no_rounding() {
+    let mut parts = Parts::new();
+    parts.manifest.force = Some(ForceSummary {
+        direction: ForceDirection::VerticalOnly,
+        normal_force: None,
+        sideways_weight: 1.3,
+        crease_points: 0,
+        rim_points: 0,
+        static_currents: "vertical".to_owned(),
+    });
+    let cell = |k: usize| DirectionCell {
+        position_m: [0.01 * k as f64, 0.0, 0.03],
+        requested_n: [0.0, 0.0, 0.7],
+        static_n: [0.1 * k as f64, 0.0, 0.7],
+        feedback_n: [1e-17, 0.0, 0.7],
+    };
+    let mut object = parts.object(&[]);
+    object.directions = Some(DirectionField {
+        x_m: [0.0, 0.03],
+        y_m: [0.0, 0.0],
+        columns: 4,
+        cells: (0..4).map(|k| Some(cell(k))).collect(),
+    });
+    let body = directions::section(&object).unwrap().body.finish();
+    let scrolls = "<figure><div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Drawing\"><svg viewBox=";
+    assert!(body.contains(scrolls), "{body}");
+    assert!(body.contains("within 0 degrees with feedback"), "{body}");
+    assert!(body.contains("degrees (all 0)<"), "{body}");
+    // Of the arrows, the three sideways forces of the static currents are left.
+    assert_eq!(body.matches("<path").count(), 3, "{body}");
 }
 
 #[test]
