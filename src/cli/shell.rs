@@ -190,8 +190,12 @@ fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
     if !help || (error.use_stderr() && printer.json()) {
         printer.usage(error);
     } else {
+        let failure = error.print().err().map(Failure::from);
         // A closed pipe: nobody is left to read the help.
-        let _ = error.print();
+        if let Some(failure) = failure.filter(|failure| failure.code().is_some()) {
+            printer.failure(&failure);
+            return failure.exit();
+        }
     }
     if error.use_stderr() {
         Exit::Usage

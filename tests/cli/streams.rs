@@ -178,6 +178,10 @@ fn a_full_disk_is_an_error_not_a_panic() {
     run_into_full(&["discretize", "shapes/wedge.toml", "--out", "-"]);
     run_into_full(&["evaluate", SEED]);
     run_into_full(&["man"]);
+    // What the reader of arguments prints itself: a script took an empty file for the version.
+    run_into_full(&["help"]);
+    run_into_full(&["--version"]);
+    run_into_full(&["evaluate", "--help"]);
     place
         .run(&["discretize", "shapes/wedge.toml", "--out", "/dev/full"])
         .ends(4)
