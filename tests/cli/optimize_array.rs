@@ -339,6 +339,13 @@ fn regression_shapes_were_lowered_into_the_coils() {
     // The plate lies at 50 mm, the workspace begins at 10 mm.
     let height = number(&result, "values/shapes.height_mm");
     assert!((-40.0..-39.0).contains(&height), "{height}");
+    // A design holds no shapes.
+    assert!(
+        result["warnings"]
+            .to_string()
+            .contains("mm lower than given: move them"),
+        "{result}"
+    );
 }
 
 /// A known answer: mirrored shapes ask for mirrored arrays.

@@ -25,6 +25,7 @@ use crate::coil::array_search::search::{Candidate, Found, Refused, Request, prob
 use crate::coil::array_search::study::{Study, study};
 use crate::coil::limits::{self, LimitCheck};
 use crate::commands::evaluate::evaluate;
+use crate::design::message_text::{number, twelve_digits};
 use crate::design::search::SearchKey;
 use crate::design::template::Template;
 use crate::design::values::derived_name;
@@ -379,7 +380,8 @@ fn result(
     let gain = together(&ratios, request.shares.as_deref());
     let constant = physics.aim().constant;
     let (design_text, best) = written(document, found)?;
-    let mut warnings = Vec::new();
+    let raised_mm = 1e3 * found.problem.space.raised_m(x);
+    let mut warnings: Vec<String> = moved_shapes(raised_mm).into_iter().collect();
     // After an interruption nothing more is computed.
     let checked = if found.interrupted {
         Checked {
@@ -428,6 +430,18 @@ fn result(
         drawn: [document.design, &best].map(|design| drawing(design, [])),
         design_text,
         warnings,
+    })
+}
+
+/// What is left to do where the shapes were moved: they are no part of the design.
+fn moved_shapes(raised_mm: f64) -> Option<String> {
+    let way = if raised_mm < 0.0 { "lower" } else { "higher" };
+    (raised_mm != 0.0).then(|| {
+        format!(
+            "the force constants are those of the shapes {} mm {way} than given: move them by translate_mm or by their \
+             heights before the design is used with them",
+            number(twelve_digits(raised_mm.abs()))
+        )
     })
 }
 
