@@ -78,7 +78,8 @@ pub enum Colour {
 pub struct Tolerance {
     /// Allowed error relative to |grad B| at the point (maps and steel: to the largest |grad B| at
     /// that height), 1e-15 to 1e-1 [default: in air 1e-12, its maps 1e-9; one coil with a steel
-    /// core 1e-6, arrays with coupled cores 1e-4; along a B-H curve 3e-4]
+    /// core 1e-6, along its B-H curve 1e-4; arrays with coupled cores 1e-4,
+    /// with other steel 1e-2]
     #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
 }
@@ -344,5 +345,38 @@ impl SurfaceFlags {
             .into_iter()
             .filter_map(|(given, name)| given.then_some(name))
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Tolerance;
+    use crate::field::winding::KERNEL_ERROR;
+    use crate::scene::tolerances::{
+        CORED_TOLERANCE, COUPLED_TOLERANCE, IRON_TOLERANCE, MAP_TOLERANCE, SATURATED_TOLERANCE,
+    };
+
+    #[derive(clap::Parser)]
+    struct Flags {
+        #[command(flatten)]
+        _tolerance: Tolerance,
+    }
+
+    #[test]
+    fn regression_the_help_stated_another_tolerance_along_bh_curves() {
+        let help = Flags::command().render_long_help().to_string();
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        for (of, default) in [
+            ("in air", KERNEL_ERROR),
+            ("its maps", MAP_TOLERANCE),
+            ("one coil with a steel core", CORED_TOLERANCE),
+            ("along its B-H curve", SATURATED_TOLERANCE),
+            ("arrays with coupled cores", COUPLED_TOLERANCE),
+            ("with other steel", IRON_TOLERANCE),
+        ] {
+            assert!(help.contains(&format!("{of} {default:e}")), "{of}: {help}");
+        }
     }
 }

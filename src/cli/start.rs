@@ -63,7 +63,7 @@ pub fn accuracy_check(missed: &[String]) -> Result<(), Failure> {
     Err(Failure::Unmet(
         Wish::Accuracy,
         format!(
-            "the tolerance (--tolerance, or the default) was not reached by {}; the result itself is given",
+            "the tolerance (--tolerance, or the default) was not reached by {}; the result itself is given, a larger --tolerance accepts it",
             missed.join("; ")
         ),
     ))

@@ -11,7 +11,7 @@ use crate::field::winding::Winding;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// More permeable steel changes no field by more than its inverse.
-const MOST_PERMEABLE: f64 = 1e9;
+pub(crate) const MOST_PERMEABLE: f64 = 1e9;
 
 /// The steel of every core of a design.
 #[derive(Debug, Clone)]

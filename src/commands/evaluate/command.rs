@@ -21,6 +21,7 @@ use crate::cli::values::{self, FileArgument};
 use crate::coil::limits::unchecked;
 use crate::design::{Design, Need};
 use crate::report::limits::label;
+use crate::scene::core_material::MOST_PERMEABLE;
 use crate::scene::cost::of_steel;
 use crate::scene::field_slice;
 use crate::scene::neighbours::{ArraySummary, IronSummary, WorkingPointSummary};
@@ -208,6 +209,11 @@ fn add_array(sheet: &mut Sheet, design: &Design, array: &ArraySummary, inductanc
 fn steel_core(core: &CoreSummary, target: &TargetSummary) -> String {
     let permeability = number(core.relative_permeability);
     let material = match core.material {
+        MaterialKind::Curve if core.relative_permeability >= MOST_PERMEABLE => {
+            format!(
+                "a B-H curve that starts level (infinite permeability, computed with {permeability})"
+            )
+        }
         MaterialKind::Curve => {
             format!("a B-H curve, relative permeability {permeability} at its origin")
         }

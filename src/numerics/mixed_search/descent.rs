@@ -57,8 +57,6 @@ pub struct Ended {
     pub u: Vec<f64>,
     /// The values there.
     pub judged: Judged,
-    /// By how much the objective grows with a unit more of each limit.
-    pub multipliers: Vec<f64>,
 }
 
 const TURNS: usize = 40;
@@ -105,11 +103,7 @@ pub fn climb(of: &dyn Fn(&[f64]) -> Judged, start: &[f64], low: &[f64], high: &[
         .collect();
     let free: Vec<usize> = (0..u.len()).filter(|&i| high[i] > low[i]).collect();
     let judged = of(&u);
-    let mut ended = Ended {
-        multipliers: vec![0.0; judged.limits.len()],
-        judged,
-        u,
-    };
+    let mut ended = Ended { judged, u };
     if free.is_empty() || !ended.judged.merit().is_finite() {
         return ended;
     }
@@ -117,12 +111,11 @@ pub fn climb(of: &dyn Fn(&[f64]) -> Judged, start: &[f64], low: &[f64], high: &[
     let mut slopes = Slopes::new(of, &ended.u, &ended.judged, (&free, low, high));
     for _ in 0..TURNS {
         poll();
-        let Ended { u, judged, .. } = &ended;
+        let Ended { u, judged } = &ended;
         let room = |ends: &[f64]| -> Vec<f64> { free.iter().map(|&i| ends[i] - u[i]).collect() };
         let Some(step) = slopes.step(judged, &curvature, (&room(low), &room(high))) else {
             break;
         };
-        ended.multipliers.clone_from(&step.limits);
         let Some((next, found)) = along(of, &ended.u, &free, &step, &ended.judged, low, high)
         else {
             break;
