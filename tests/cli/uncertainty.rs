@@ -178,6 +178,25 @@ fn a_replay_commands_the_currents_that_its_bundle_was_made_for() {
     assert_eq!(plain["made_with"]["robust"], Value::Null);
 }
 
+/// The vector's error was drawn, beside which currents chosen for the upward force looked worst.
+#[test]
+fn regression_the_plot_shows_another_error_than_currents_are_chosen_for() {
+    let place = Place::new();
+    let shape = flat(&place);
+    let upward = |force: &str| {
+        let args = ["calibrate", SEED, shape, "--sensor-error", "4mm"];
+        place.run(&[&args[..], &["--force-direction", force, "--force"]].concat());
+        let plot = place.text("results/seed_air/flat/plots/uncertainty.svg");
+        let page = place.text("results/seed_air/flat/report.html");
+        ["upward error", "least error of the upward force"]
+            .iter()
+            .zip([plot, page])
+            .all(|(words, of)| of.contains(words))
+    };
+    assert!(upward("vertical"));
+    assert!(!upward("vertical-only"));
+}
+
 #[test]
 fn bounds_beyond_the_map_or_all_sense_are_refused() {
     let place = Place::new();

@@ -30,14 +30,21 @@ fn all(study: &Study) -> [(&'static str, &CurrentsError); 4] {
     ]
 }
 
-/// Error against power.
+/// Error against power: of the force that is requested, by which currents are chosen.
 pub(super) fn plot(object: &CalibratedObject, study: &Study) -> CurvesPlot {
+    let vector = object.manifest.force.is_some();
+    let of_requested = |whole: f64, upward: f64| if vector { whole } else { upward };
+    let place = |error: &CurrentsError| {
+        let error = &error.promised;
+        let of = of_requested(error.expected, error.vertical);
+        (error.mean_power_w, of)
+    };
     let curve = |(name, setting): (&str, &RobustSetting)| {
-        let point = |of: &TradeOff| (of.mean_power_w, of.expected);
-        let promised = &setting.error.promised;
+        let point = |of: &TradeOff| (of.mean_power_w, of_requested(of.expected, of.vertical));
+        let promised = place(&setting.error);
         let mut points: Vec<_> = setting.trade_off.iter().map(point).collect();
-        let chosen = points.partition_point(|(power, _)| *power < promised.mean_power_w);
-        points.insert(chosen, (promised.mean_power_w, promised.expected));
+        let chosen = points.partition_point(|(power, _)| *power < promised.0);
+        points.insert(chosen, promised);
         Line {
             name: name.to_owned(),
             points,
@@ -46,7 +53,7 @@ pub(super) fn plot(object: &CalibratedObject, study: &Study) -> CurvesPlot {
     };
     let alone = |name: &str, error: &CurrentsError| Line {
         name: name.to_owned(),
-        points: vec![(error.promised.mean_power_w, error.promised.expected)],
+        points: vec![place(error)],
         marked: Vec::new(),
     };
     let mut lines = settings(study).map(curve).to_vec();
@@ -58,7 +65,11 @@ pub(super) fn plot(object: &CalibratedObject, study: &Study) -> CurvesPlot {
             object.lambda.shape, object.lambda.design
         ),
         across: "mean power / W".to_owned(),
-        up: "expected error, relative to the requested force".to_owned(),
+        up: if vector {
+            "expected error, relative to the requested force".to_owned()
+        } else {
+            "expected upward error, relative to the requested force".to_owned()
+        },
         mark: "chosen",
         lines,
     }
@@ -104,12 +115,17 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
         "The magnet may be {} mm off along each axis, tilted by {} degrees, {} C warmer, its drivers {} off, each \
          evenly within its bound. Errors are of the force vector, root mean squares over points and uncertainties, \
          relative to the requested force; the worst is relative to the largest requested force. Promised by a \
-         quadratic form, realised by {} random displays.",
+         quadratic form, realised by {} random displays. {}",
         figures(1e3 * given.sensor_m, 3),
         figures(given.tilt_deg, 3),
         figures(given.heat_c, 3),
         percent(given.driver),
-        study.draws
+        study.draws,
+        if object.manifest.force.is_some() {
+            "Currents are chosen for the least error of the vector."
+        } else {
+            "Currents are chosen for the least error of the upward force, which alone is requested; the plot shows it."
+        }
     );
     body.element("p", &text);
     body.raw("<figure>")
