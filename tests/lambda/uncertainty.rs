@@ -435,6 +435,13 @@ fn causes_are_ranked_by_what_halving_them_gains() {
         .sum();
     let all = found.feedback.promised.expected.powi(2) - found.exact.feedback.powi(2);
     assert!((squares / all - 1.0).abs() < 0.1, "{squares} {all}");
+    // Of the upward force, where it alone is requested; the vector's was stated.
+    let upward = |given: &Uncertainty| of_surface(given, false, None);
+    let (whole, halved) = (upward(&ALL), upward(&ALL.halved(Cause::Tilt)));
+    let tilt = whole.causes.iter().find(|cost| cost.cause == Cause::Tilt);
+    let error = |of: &Study| of.feedback.promised.vertical;
+    let gains = error(&whole) - error(&halved);
+    assert!((tilt.unwrap().halving_gains.feedback - gains).abs() < 1e-12);
     // Nothing uncertain: feedback within reach is exact, and nobody gains.
     let exact = of_surface(&Uncertainty::default(), true, None);
     assert!(exact.causes.is_empty());

@@ -131,8 +131,8 @@ pub struct CauseCost {
     pub bound: f64,
     /// The error that it adds alone: the root of the difference of squares with and without it.
     pub alone: Shares,
-    /// By how much the expected error falls when its bound is half as large; currents for the
-    /// uncertainties are chosen again.
+    /// By how much the expected error that currents are chosen for falls when its bound is half as large: the
+    /// vector's, or the upward one where that alone is requested. Currents for the uncertainties are chosen again.
     pub halving_gains: Shares,
 }
 
@@ -287,6 +287,15 @@ impl<'a> Bench<'a> {
             sideways: share(sideways),
             worst: 0.0,
             mean_power_w: power / self.weight,
+        }
+    }
+
+    /// The objective: the error of the requested force.
+    fn aim(&self, error: &FeltError) -> f64 {
+        if self.around.vector {
+            error.expected
+        } else {
+            error.vertical
         }
     }
 
@@ -502,24 +511,15 @@ impl<'a> Chooser<'a> {
         (currents, error)
     }
 
-    /// The objective: the error of the requested force.
-    fn aim(&self, error: &FeltError) -> f64 {
-        if self.bench.around.vector {
-            error.expected
-        } else {
-            error.vertical
-        }
-    }
-
     /// The setting, and the curve; `top` is the highest price.
     fn choose(&self, top: f64, cap_w: Option<f64>) -> (f64, Currents, Vec<TradeOff>) {
         let prices = (0..PRICES).map(|k| top * PRICE_FACTOR.powi(k));
         let curve: Vec<(f64, FeltError)> = prices.map(|price| (price, self.at(price).1)).collect();
-        let least = curve.last().map_or(0.0, |(_, error)| self.aim(error));
+        let least = curve.last().map_or(0.0, |(_, error)| self.bench.aim(error));
         // Above the price at which this ends, power is too dear: too little error is bought, or the cap holds.
         let dear = |error: &FeltError| match cap_w {
             Some(cap) => error.mean_power_w <= cap,
-            None => self.aim(error) > NEAR_LEAST * least,
+            None => self.bench.aim(error) > NEAR_LEAST * least,
         };
         let mut high = top;
         if cap_w.is_some() {
@@ -633,35 +633,39 @@ struct Costs<'a> {
 }
 
 impl Costs<'_> {
-    fn shares(&self, forms: &[Forms], robust: &Currents) -> Shares {
-        let expected = |currents| self.bench.expected(forms, currents).expected;
-        Shares {
-            fixed: expected(self.fixed),
-            feedback: expected(self.feedback),
-            robust: expected(robust),
-        }
+    /// The errors of the vector and those that currents are chosen for.
+    fn shares(&self, forms: &[Forms], robust: &Currents) -> [Shares; 2] {
+        let [fixed, feedback, robust] =
+            [self.fixed, self.feedback, robust].map(|own| self.bench.expected(forms, own));
+        let of = |error: &dyn Fn(&FeltError) -> f64| Shares {
+            fixed: error(&fixed),
+            feedback: error(&feedback),
+            robust: error(&robust),
+        };
+        [
+            of(&|error| error.expected),
+            of(&|error| self.bench.aim(error)),
+        ]
     }
 
     /// The errors if nothing were uncertain, and the costs; `all` are the forms of everything.
     fn ranked(&self, all: &[Forms]) -> (Shares, Vec<CauseCost>) {
         let (around, lambda) = (self.bench.around, self.bench.lambda);
         let exact = around.forms(lambda, &Uncertainty::default(), Reach::Point);
-        let (exact, all) = (
-            self.shares(&exact, self.robust),
-            self.shares(all, self.robust),
-        );
+        let [exact, _] = self.shares(&exact, self.robust);
+        let [_, all] = self.shares(all, self.robust);
         let cost = |cause: Cause| {
             let (only, halved) = (self.given.only(cause), self.given.halved(cause));
             let (reach, half) = match cause {
                 Cause::Sensor => (Reach::Whole, Reach::Half),
                 Cause::Tilt | Cause::Heat | Cause::Driver => (Reach::Point, Reach::Whole),
             };
-            let with = self.shares(&around.forms(lambda, &only, reach), self.robust);
+            let [with, _] = self.shares(&around.forms(lambda, &only, reach), self.robust);
             let forms = around.forms(lambda, &halved, half);
             let again = Chooser::new(self.bench, &forms, false)
                 .at(self.price_n2_per_w)
                 .0;
-            let less = self.shares(&forms, &again);
+            let [_, less] = self.shares(&forms, &again);
             let added = |with: f64, without: f64| (with * with - without * without).max(0.0).sqrt();
             CauseCost {
                 cause,
