@@ -132,7 +132,7 @@ fn left_out_tolerance(scene: &Scene) -> f64 {
     }
 }
 
-/// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
+/// The pull wherever the magnet's centre is among `places_m`; `None` without steel or places. With `alone`
 /// it is that of one core at the origin.
 ///
 /// # Errors
@@ -163,6 +163,9 @@ pub fn pull_to(
     alone: bool,
     tolerance: f64,
 ) -> Result<Option<Pull>, RunError> {
+    if places_m.is_empty() {
+        return Ok(None);
+    }
     if let (Some(iron), false) = (&scene.iron, alone) {
         let pull = of_iron(scene, iron, places_m, tolerance)?;
         return Ok(pull.map(Pull::Iron));

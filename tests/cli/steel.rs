@@ -407,3 +407,23 @@ fn every_stage_that_a_tolerance_governs_reaches_it_or_says_that_it_does_not() {
         .json();
     assert_eq!(plain["accuracy_reached"], true);
 }
+
+/// Where no cell between the points needed samples, their pull was that at no place: "inf mm high".
+#[test]
+fn regression_a_plate_within_its_grid_had_no_pull_of_the_steel() {
+    let place = Place::new();
+    place.write(
+        "pull.toml",
+        "name = \"pull\"\n[coil]\ninner_diameter_mm = 10.0\nouter_diameter_mm = 22.0\nlength_mm = 30.0\n[wire]\n\
+         diameter_mm = 0.5\n[core]\nbelow_mm = 2\n[array]\nrows = 2\ncolumns = 2\npitch_mm = 24\n[magnet]\n\
+         passive_force = true\n",
+    );
+    place.write(
+        "plate.toml",
+        "name = \"plate\"\nprimitive = \"flat\"\nside_mm = 40\nheight_mm = 20\n[points]\n\
+         x_mm = [-50, 50, 31]\ny_mm = [-50, 50, 31]\n",
+    );
+    let args = ["lambda", "pull.toml", "plate.toml", "--format", "json"];
+    let found = place.run(&args).ends(0).json();
+    assert!(found["lambda_n_per_m"].as_f64().unwrap() > 0.0);
+}
