@@ -1,6 +1,7 @@
 //! The settings of every knob, from coarse to fine, and what measuring them will take.
 
 use super::clock::Effort;
+use super::places;
 use super::{BenchRequest, Estimate};
 use crate::bundle::bench::{Knob, KnobName, Setting};
 use crate::design::Design;
@@ -215,9 +216,12 @@ impl Ladders {
         let maps: f64 = nodes.map(|rung| one(self.seconds.map_s * rung.share)).sum();
         let tolerances = self.tolerance.len();
         let finest = 4.0 * self.points.last().map_or(1.0, |rung| rung.share);
+        let places =
+            places::expected(self.nodes.len()) as f64 / self.points_present.len().max(1) as f64;
         let per_tolerance = one(self.seconds.steel_s) + of_points(self.seconds.lambda_s) + maps;
         let reference = REFINED_STEEL * self.seconds.steel_s
-            + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.lambda_s);
+            + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.lambda_s)
+            + places * self.seconds.lambda_s;
         let cpu_s =
             reference + of_points(self.seconds.points_s) + tolerances as f64 * per_tolerance;
         let computations =

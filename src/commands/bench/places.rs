@@ -1,28 +1,25 @@
-//! Places of a surface at which the felt force is compared: spread over the cells of the coarsest map, and
-//! between them, where the surface is steep or ends, over the cells of the finest from one height to the next.
+//! Places of a surface at which the felt force is compared: within the cells of every map of the sweep, in whose
+//! middle a cubic errs most, and between them, where the surface is steep or ends, over the cells of the finest from
+//! one height to the next.
 
 use super::ladder::{Ladders, NodesRung};
 use super::stages::Bench;
 use crate::RunError;
 use crate::commands::calibrate::DEFAULT_REACH_M;
 use crate::numerics::axis::Axis;
-use crate::numerics::spread::part;
 use crate::progress::Silent;
 use crate::scene::sources::ShapeSource;
 use crate::shape::Surface;
 use crate::shape::scattered::Probe;
 
-/// Places per cell of the coarsest map along an axis. Sixths and thirds stay thirds as cells are halved, where a
-/// cubic's error is 88 % of that in the middle: no finer map has a node there.
-const PER_CELL: usize = 6;
+/// Places along an axis within the cells of one map, at most about: between them the currents' error changes little.
+const OF_MAP: usize = 32;
+/// Parts of a cell that have a place each, at most.
+const MOST_PARTS: usize = 9;
 /// Places per cell of the finest map from one height to the next, at least: one lies within a sixth of its middle.
 const PER_HEIGHT: f64 = 3.0;
 /// Of the places between others not more than about this; more of a surface that is steep everywhere say no more.
 const MOST_BETWEEN: usize = 20_000;
-/// Of a map of many cells not more places along an axis than about this, farther apart.
-const MOST: f64 = 64.0;
-/// Of a plan with fewer places along an axis than this, as many more.
-const FEWEST: usize = 5;
 /// Halvings between two places towards a rim or a jump: of a millimetre to two micrometres.
 const HALVINGS: u32 = 9;
 
@@ -37,7 +34,8 @@ pub(super) struct Chosen {
     pub(super) out_of_reach: usize,
 }
 
-/// Places of the surface over the plan of its present points, the ends included, as far as the maps reach.
+/// Places of the surface over the part of the plan of its present points where it is, the ends included, as far as
+/// the maps reach.
 ///
 /// # Errors
 /// A surface that cannot be read or that has none of these places; interruption.
@@ -56,14 +54,18 @@ pub(super) fn choose(
     let probe = Probe::new(&surface, &points.grid);
     let workspace = &bench.request.design.workspace;
     let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-    let cell_m = |nodes: &NodesRung, k: usize| {
-        let samples = nodes.samples[k];
-        Axis { samples, ..axes[k] }.step()
+    let extent = surface.extent();
+    let along = |plan: Axis, k: usize| {
+        let ends = [extent.min_m[k].max(plan.from), extent.max_m[k].min(plan.to)];
+        let cell_m = |nodes: &NodesRung| {
+            let samples = nodes.samples[k];
+            Axis { samples, ..axes[k] }.step()
+        };
+        spread(ends, axes[k].from, ladders.nodes.iter().map(cell_m))
     };
-    let [coarsest, finest] = [&ladders.nodes[0], &ladders.nodes[ladders.nodes.len() - 1]];
-    let x_m = spread(points.grid.x_m, axes[0].from, cell_m(coarsest, 0));
-    let y_m = spread(points.grid.y_m, axes[1].from, cell_m(coarsest, 1));
-    let step_m = cell_m(finest, 2) / PER_HEIGHT;
+    let (x_m, y_m) = (along(points.grid.x_m, 0), along(points.grid.y_m, 1));
+    let samples = ladders.nodes[ladders.nodes.len() - 1].samples[2];
+    let step_m = Axis { samples, ..axes[2] }.step() / PER_HEIGHT;
     let (mut nodes, mut more): (Vec<Node>, Vec<Node>) = Default::default();
     let mut below: Option<Vec<Node>> = None;
     for y in y_m {
@@ -100,27 +102,35 @@ pub(super) fn choose(
     })
 }
 
-/// Both ends of the plan, and places between by equal parts of cells that begin at `from`.
-fn spread(plan: Axis, from: f64, cell_m: f64) -> Vec<f64> {
-    let width_m = plan.to - plan.from;
-    if plan.samples < 2 || width_m <= 0.0 {
-        return vec![plan.from];
+/// How many places a surface has about, by the number of maps, but for those between others.
+pub(super) fn expected(maps: usize) -> usize {
+    (OF_MAP * maps).pow(2)
+}
+
+/// Both ends, and between them the middles of odd parts of the cells of every map, none of which is a node of it, or
+/// of many cells the middles of some. Cells begin at `node`.
+fn spread([from, to]: [f64; 2], node: f64, cells_m: impl Iterator<Item = f64>) -> Vec<f64> {
+    if from >= to {
+        return vec![from];
     }
-    let sixths = if cell_m > 0.0 { width_m / cell_m } else { 1.0 } * PER_CELL as f64;
-    // Multiples of three would fall on nodes of a finer map, and on nothing else.
-    let stride = (1..).find(|n| n % 3 != 0 && sixths <= MOST * f64::from(*n));
-    let step_m = width_m / sixths * f64::from(stride.unwrap_or(1));
-    let first = ((plan.from - from) / step_m).floor() as i64 + 1;
-    let inner = (first..)
-        .map(|n| from + n as f64 * step_m)
-        .take_while(|place| *place < plan.to);
-    let mut all: Vec<f64> = std::iter::once(plan.from).chain(inner).collect();
-    all.push(plan.to);
-    if all.len() < FEWEST {
-        // Of so narrow a plan all of these may be nodes.
-        all.extend((1..=FEWEST).map(|n| plan.from + part(n) * width_m));
-        all.sort_by(f64::total_cmp);
+    let mut all = vec![from, to];
+    for cell_m in cells_m {
+        let cell_m = if cell_m > 0.0 { cell_m } else { to - from };
+        let cells = (to - from) / cell_m;
+        let parts = (1..=MOST_PARTS).rev().step_by(2);
+        let parts = parts
+            .filter(|parts| *parts as f64 * cells <= OF_MAP as f64)
+            .max();
+        let (first_m, step_m) = match parts {
+            Some(parts) => (0.5 * cell_m / parts as f64, cell_m / parts as f64),
+            None => (0.5 * cell_m, (cells / OF_MAP as f64).ceil() * cell_m),
+        };
+        let place = |number: i64| node + first_m + number as f64 * step_m;
+        let number = ((from - node - first_m) / step_m).ceil() as i64;
+        all.extend((number..).map(place).take_while(|place| *place < to));
     }
+    all.sort_by(f64::total_cmp);
+    all.dedup();
     all
 }
 
@@ -159,49 +169,36 @@ fn reach(axis: Axis, points_m: &[f64]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::interpolation::SAFETY;
 
-    /// A plan of two cells had its ends and its middle, nodes of a finer map: a felt error of 1e-14 was stated.
+    /// A map's cells were looked at in sixths of the coarsest one's, which met the middle of a finer one every 17 mm: a
+    /// felt error of 12 % was stated as 9 %. A plan of two cells had its ends and its middle, nodes of a finer map.
     #[test]
-    fn a_plan_of_two_cells_has_places_between_nodes() {
-        let half_m = 0.1 / 60.0;
-        let plan = Axis {
-            from: -half_m,
-            to: half_m,
-            samples: 5,
-        };
-        for cells in [8, 15, 30, 60] {
-            let all = spread(plan, -0.05, 0.1 / f64::from(cells));
-            assert!(all.windows(2).all(|pair| pair[0] <= pair[1]));
-            let middle = |place: &&f64| {
-                let cells = (**place + 0.05) / half_m;
-                (cells - cells.round()).abs() > 0.15
-            };
-            assert!(all.iter().filter(middle).count() >= 2, "{cells} {all:?}");
-        }
-    }
-
-    /// Places on nodes alone would find maps without error.
-    #[test]
-    fn places_have_both_ends_and_miss_the_nodes_of_every_finer_map() {
-        for cells in [8, 15, 61, 211] {
-            let plan = Axis {
-                from: -0.047,
-                to: 0.031,
-                samples: 33,
-            };
-            let (from, width_m) = (-0.05, 0.1);
-            let cell_m = width_m / f64::from(cells);
-            let all = spread(plan, from, cell_m);
-            assert_eq!((all[0], all[all.len() - 1]), (plan.from, plan.to));
-            assert!(all.len() < 70 && all.windows(2).all(|pair| pair[0] < pair[1]));
-            for halvings in 0..5 {
-                let node = |place: &&f64| {
-                    let cells = (**place - from) / cell_m * f64::from(1 << halvings);
-                    (cells - cells.round()).abs() < 0.3
-                };
-                let between = all.len() - all.iter().filter(node).count();
-                assert!(3 * between > all.len(), "{cells} {halvings} {between}");
+    fn regression_places_missed_the_middle_of_cells() {
+        let maps = [8, 15, 30, 60, 211].map(|cells| 0.1 / f64::from(cells));
+        let (node, scale_m) = (-0.05, 0.012);
+        for ends in [[-0.02, 0.02], [-0.047, 0.031], [-0.1 / 60.0, 0.1 / 60.0]] {
+            let all = spread(ends, node, maps.into_iter());
+            assert_eq!([all[0], all[all.len() - 1]], ends);
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1]));
+            assert!(all.len() <= OF_MAP * maps.len() + 2, "{}", all.len());
+            for cell_m in maps {
+                let cells = (0.1 / cell_m).round() as usize;
+                let middles = (0..cells).map(|n| node + (n as f64 + 0.5) * cell_m);
+                for middle in middles.filter(|place| (ends[0]..=ends[1]).contains(place)) {
+                    // The error of a cubic in its cell, largest about this middle.
+                    let error = |place: &f64| {
+                        let t = ((place - node) / cell_m).rem_euclid(1.0);
+                        let of_cell = t * (1.0 - t) * (1.0 + t) * (2.0 - t) / 0.5625;
+                        of_cell / (1.0 + ((place - middle) / scale_m).powi(2))
+                    };
+                    let found = all.iter().map(error).fold(0.0, f64::max);
+                    // Along both axes no less than the factor for what lies between places covers.
+                    assert!(found * found * SAFETY > 1.0, "{ends:?} {cell_m} {found}");
+                }
             }
         }
+        assert_eq!(spread([0.03, 0.03], node, maps.into_iter()), [0.03]);
+        assert_eq!(spread([0.0, 0.01], node, [0.0].into_iter()).len(), 11);
     }
 }

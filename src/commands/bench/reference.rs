@@ -7,6 +7,7 @@ use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
 use crate::commands::lambda::ForcesAt;
+use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring, lowest_requested_m};
 use crate::map::FieldMap;
 use crate::map::interpolation::SAFETY;
@@ -18,10 +19,10 @@ use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
 use crate::scene::{Scene, coupled};
 
-/// Tolerance of the refined field in air: the kernel's own rounding.
-const AIR: f64 = 1e-15;
-/// The refined field's tolerance over steel against the tightest of the ladder.
-const STEEL: f64 = 0.1;
+/// The refined field's tolerance against the tightest of the ladder.
+const FINER: f64 = 0.1;
+/// The finest of the windings' field alone.
+const FINEST_AIR: f64 = 1e-15;
 /// The tightest tolerance requested of steel.
 const TIGHTEST_STEEL: f64 = 1e-9;
 /// Where the stated error of the refined steel is at most this share of the present one's, the change between them
@@ -67,7 +68,7 @@ impl Fields {
         let mut refined = solve(tolerance)?;
         // Two loose tolerances may share a resolution; a core alone is soon solved again.
         let alone = !coupled(scene.design) && !scene.design.has_iron();
-        let finer = STEEL * tolerance;
+        let finer = FINER * tolerance;
         if alone && finer >= TIGHTEST_STEEL && !clearly(&refined) {
             refined = solve(finer)?;
         }
@@ -205,9 +206,9 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     let tightest = scene.tolerances.map;
     let in_air = scene.core.is_none();
     let tolerance = if in_air {
-        AIR
+        KERNEL_ERROR.min((FINER * tightest).max(FINEST_AIR))
     } else {
-        (STEEL * tightest).max(TIGHTEST_STEEL.min(tightest))
+        (FINER * tightest).max(TIGHTEST_STEEL.min(tightest))
     };
     let fields = Fields::new(bench, tolerance)?;
     let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
@@ -275,7 +276,7 @@ impl Refined {
     /// As the result states it.
     pub fn summary(&self) -> Reference {
         let field = if self.in_air {
-            "the windings' field to rounding"
+            "the windings' field to 1e-12 or a tenth of the present tolerance"
         } else {
             "the field to a tenth of the present tolerance or less"
         };
