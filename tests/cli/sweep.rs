@@ -399,8 +399,28 @@ fn points_of_another_plan_are_refused() {
         place
             .run(&["sweep", "merge", plan, "p", "--partial"])
             .ends(4)
-            .says(&["belongs to another plan"]);
+            .says(&["another plan"]);
     }
+}
+
+/// A folder after one that had all points was not looked at.
+#[test]
+fn regression_a_folder_of_another_plan_was_ignored_after_a_whole_one() {
+    let place = Place::new();
+    let set = |turns: &str| format!("coil.turns={turns}");
+    for (name, turns) in [("one", "700,760"), ("two", "800,860")] {
+        let plan = format!("{name}.json");
+        let args = ["sweep", "plan", SEED, "--set", &set(turns), "--out", &plan];
+        place.run(&args).ends(0);
+        place.run(&["sweep", "run", &plan, "--out", name]).ends(0);
+    }
+    for folders in [["one", "two"], ["two", "one"]] {
+        place
+            .run(&[&["sweep", "merge", "one.json"][..], &folders].concat())
+            .ends(4)
+            .says(&["another plan"]);
+    }
+    place.run(&["sweep", "merge", "one.json", "one"]).ends(0);
 }
 
 #[test]

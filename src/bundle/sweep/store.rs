@@ -17,6 +17,8 @@ use crate::write::write_json;
 
 /// The folder of the points' folders.
 const POINTS: &str = "points";
+/// The plan of a folder.
+const PLAN: &str = "plan.json";
 /// Points in one folder.
 const FOLDER: u64 = 1000;
 /// Larger files are no point of a sweep.
@@ -80,7 +82,7 @@ impl PointStore {
         force: bool,
         indices: std::ops::Range<u64>,
     ) -> Result<SharedFolders, WriteError> {
-        let path = self.folder.join("plan.json");
+        let path = self.folder.join(PLAN);
         let ours = belongs_to(&path, plan, force)?;
         let mut folders = SharedFolders::default();
         if !indices.is_empty() {
@@ -96,6 +98,14 @@ impl PointStore {
             }
         }
         Ok(folders)
+    }
+
+    /// Refuses a folder that holds another plan than this.
+    ///
+    /// # Errors
+    /// That; a plan that cannot be read.
+    pub fn check_plan(&self, plan: &PlanFile) -> Result<(), WriteError> {
+        belongs_to(&self.folder.join(PLAN), plan, false).map(drop)
     }
 
     /// State of the file of point `index` of the plan with this digest.

@@ -193,6 +193,9 @@ pub fn merge(
     files: &MergeFiles,
     progress: &dyn Progress,
 ) -> Result<MergeReport, RunError> {
+    for folder in &request.folders {
+        PointStore::new(folder).check_plan(plan)?;
+    }
     let name = |suffix: &str| {
         let stem = files.table.file_stem().unwrap_or_default();
         format!("{}{suffix}", stem.to_string_lossy())

@@ -31,7 +31,8 @@ use crate::cli::values::{self, FileArgument};
 /// shapes' force constants (column mean_lambda_n_per_m) instead of the force; the column gain is over each row's
 /// own given array, which the set keys may change. Missing points are named and end with exit code 4 and no table,
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
-/// warning; a table with fewer missing is replaced with --force alone. Points of another plan are refused.
+/// warning; a table with fewer missing is replaced with --force alone. A point that is in several folders is taken
+/// from the first of them. Folders and points of another plan are refused.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
