@@ -19,6 +19,8 @@ use fluxform_numerics::axis::Axis;
 
 /// Absolute zero, C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
+/// By its linear law copper has no resistivity at -234.45 C.
+const COLDEST_COPPER_C: f64 = -234.0;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -358,7 +360,7 @@ const WINDING_MAX_C: f64 = 155.0;
 
 /// `[cooling]`.
 pub fn cooling(mut s: Section<'_>) -> Cooling {
-    let warm = Rule::any("C").bound(Bound::AtLeast(ABSOLUTE_ZERO_C));
+    let warm = Rule::any("C").bound(Bound::AtLeast(COLDEST_COPPER_C));
     let surface = Rule::any("W/(m^2 K)").positive();
     let cooling = Cooling {
         surface_w_per_m2_k: s

@@ -474,7 +474,7 @@ impl<'a> Section<'a> {
         };
         let Some(value) = value else {
             let expected = if rule.gauges {
-                "a number or a gauge like \"AWG 22\""
+                "a number or a gauge like \"AWG 22\", from 4/0 to 56"
             } else {
                 "a number"
             };

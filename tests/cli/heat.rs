@@ -58,4 +58,13 @@ fn the_hottest_coil_of_an_object_is_that_of_the_largest_current() {
         .run(&["evaluate", "cold.toml"])
         .ends(3)
         .says(&["cooling.surface_w_per_m2_k", "greater than 0"]);
+    // So cold copper had a negative resistance, and cooled as it was driven.
+    place.write(
+        "cold.toml",
+        &cold.replace("surface_w_per_m2_k = 0.0", "ambient_c = -240.0"),
+    );
+    place
+        .run(&["evaluate", "cold.toml"])
+        .ends(3)
+        .says(&["cooling.ambient_c", "at least -234"]);
 }
