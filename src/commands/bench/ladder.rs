@@ -1,7 +1,6 @@
 //! The settings of every knob, from coarse to fine, and what measuring them will take.
 
 use super::clock::Effort;
-use super::places;
 use super::{BenchRequest, Estimate};
 use crate::bundle::bench::{Knob, KnobName, Setting};
 use crate::design::Design;
@@ -31,6 +30,8 @@ const QUICK_S: f64 = 60.0;
 const FULL_S: f64 = 600.0;
 /// A refined solution of steel against the present one, beside which it is held.
 const REFINED_STEEL: f64 = 8.0 + 1.0;
+/// Places along an axis within the cells of one map at which the felt force is compared, at most about.
+pub(super) const PLACES_OF_MAP: usize = 32;
 /// Forces in the refined field, in the present one beside it, and force constants.
 const REFINED_FORCES: f64 = 3.0;
 
@@ -216,8 +217,8 @@ impl Ladders {
         let maps: f64 = nodes.map(|rung| one(self.seconds.map_s * rung.share)).sum();
         let tolerances = self.tolerance.len();
         let finest = 4.0 * self.points.last().map_or(1.0, |rung| rung.share);
-        let places =
-            places::expected(self.nodes.len()) as f64 / self.points_present.len().max(1) as f64;
+        let places = (PLACES_OF_MAP * self.nodes.len()).pow(2) as f64
+            / self.points_present.len().max(1) as f64;
         let per_tolerance = one(self.seconds.steel_s) + of_points(self.seconds.lambda_s) + maps;
         let reference = REFINED_STEEL * self.seconds.steel_s
             + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.lambda_s)

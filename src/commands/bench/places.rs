@@ -2,7 +2,7 @@
 //! middle a cubic errs most, and between them, where the surface is steep or ends, over the cells of the finest from
 //! one height to the next.
 
-use super::ladder::{Ladders, NodesRung};
+use super::ladder::{Ladders, NodesRung, PLACES_OF_MAP};
 use super::stages::Bench;
 use crate::RunError;
 use crate::commands::calibrate::DEFAULT_REACH_M;
@@ -12,8 +12,6 @@ use crate::scene::sources::ShapeSource;
 use crate::shape::Surface;
 use crate::shape::scattered::Probe;
 
-/// Places along an axis within the cells of one map, at most about: between them the currents' error changes little.
-const OF_MAP: usize = 32;
 /// Parts of a cell that have a place each, at most.
 const MOST_PARTS: usize = 9;
 /// Places per cell of the finest map from one height to the next, at least: one lies within a sixth of its middle.
@@ -102,11 +100,6 @@ pub(super) fn choose(
     })
 }
 
-/// How many places a surface has about, by the number of maps, but for those between others.
-pub(super) fn expected(maps: usize) -> usize {
-    (OF_MAP * maps).pow(2)
-}
-
 /// Both ends, and between them the middles of odd parts of the cells of every map, none of which is a node of it, or
 /// of many cells the middles of some. Cells begin at `node`.
 fn spread([from, to]: [f64; 2], node: f64, cells_m: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -119,11 +112,11 @@ fn spread([from, to]: [f64; 2], node: f64, cells_m: impl Iterator<Item = f64>) -
         let cells = (to - from) / cell_m;
         let parts = (1..=MOST_PARTS).rev().step_by(2);
         let parts = parts
-            .filter(|parts| *parts as f64 * cells <= OF_MAP as f64)
+            .filter(|parts| *parts as f64 * cells <= PLACES_OF_MAP as f64)
             .max();
         let (first_m, step_m) = match parts {
             Some(parts) => (0.5 * cell_m / parts as f64, cell_m / parts as f64),
-            None => (0.5 * cell_m, (cells / OF_MAP as f64).ceil() * cell_m),
+            None => (0.5 * cell_m, (cells / PLACES_OF_MAP as f64).ceil() * cell_m),
         };
         let place = |number: i64| node + first_m + number as f64 * step_m;
         let number = ((from - node - first_m) / step_m).ceil() as i64;
@@ -181,7 +174,7 @@ mod tests {
             let all = spread(ends, node, maps.into_iter());
             assert_eq!([all[0], all[all.len() - 1]], ends);
             assert!(all.windows(2).all(|pair| pair[0] < pair[1]));
-            assert!(all.len() <= OF_MAP * maps.len() + 2, "{}", all.len());
+            assert!(all.len() <= PLACES_OF_MAP * maps.len() + 2, "{}", all.len());
             for cell_m in maps {
                 let cells = (0.1 / cell_m).round() as usize;
                 let middles = (0..cells).map(|n| node + (n as f64 + 0.5) * cell_m);

@@ -106,12 +106,10 @@ pub(super) fn table(study: &Study) -> io::Result<Vec<u8>> {
     Ok(out)
 }
 
-/// The page's section; `None` where nothing is uncertain.
-pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
-    let study = object.lambda.uncertainty.as_ref()?;
-    let mut body = Html::default();
+/// What is uncertain, and what the errors are.
+fn explained(object: &CalibratedObject, study: &Study) -> String {
     let given = &study.given;
-    let text = format!(
+    format!(
         "The magnet may be {} mm off along each axis, tilted by {} degrees, {} C warmer, its drivers {} off, each \
          evenly within its bound. Errors are of the force vector, root mean squares over points and uncertainties, \
          relative to the requested force; the worst is relative to the largest requested force. Promised by a \
@@ -126,8 +124,14 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
         } else {
             "Currents are chosen for the least error of the upward force, which alone is requested; the plot shows it."
         }
-    );
-    body.element("p", &text);
+    )
+}
+
+/// The page's section; `None` where nothing is uncertain.
+pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
+    let study = object.lambda.uncertainty.as_ref()?;
+    let mut body = Html::default();
+    body.element("p", &explained(object, study));
     body.raw("<figure>")
         .raw(&plot(object, study).drawing().svg())
         .raw("</figure>");
