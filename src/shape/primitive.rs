@@ -223,6 +223,28 @@ mod tests {
         PlacedPrimitive::new(primitive, &placement).unwrap()
     }
 
+    /// Turned, a rectangle's box holds its corners; a sphere's is the same.
+    #[test]
+    fn a_box_is_moved_and_turned_with_its_shape() {
+        let at = [0.01, -0.02, 0.004];
+        let (sin, cos) = 30.0_f64.to_radians().sin_cos();
+        let (across, along) = (0.05 * cos + 0.05 * sin, 0.05 * sin + 0.05 * cos);
+        for (primitive, turned, [low, high]) in [
+            (FLAT, [across, along], [0.05, 0.05]),
+            (WEDGE, [across, along], [0.03, 0.08]),
+            (HALF_CYLINDER, [across, along], [0.03, 0.08]),
+            (HALF_SPHERE, [0.05; 2], [0.03, 0.08]),
+        ] {
+            let found = placed(primitive, at, 30.0).bounds();
+            for axis in 0..2 {
+                assert!((found.min_m[axis] - (at[axis] - turned[axis])).abs() < 1e-15);
+                assert!((found.max_m[axis] - (at[axis] + turned[axis])).abs() < 1e-15);
+            }
+            assert!((found.min_m[2] - (at[2] + low)).abs() < 1e-15);
+            assert!((found.max_m[2] - (at[2] + high)).abs() < 1e-15);
+        }
+    }
+
     /// Points of the seed's 61 x 61 grid, moved with the shape, that have surface.
     fn covered(primitive: Primitive, at: [f64; 3], turn: f64) -> usize {
         let shape = placed(primitive, at, turn);

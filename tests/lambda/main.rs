@@ -13,6 +13,7 @@ mod power;
 mod saturation;
 
 mod scale;
+mod sideways;
 mod two_fingers;
 mod uncertainty;
 mod vector_allocation;

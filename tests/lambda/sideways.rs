@@ -1,0 +1,56 @@
+//! What static currents and feedback of the upward force leave along x and y, by hand.
+
+use fluxform_lambda::ForceProblem;
+use fluxform_lambda::sideways::sideways;
+
+/// Two coils of 1 and 4 ohm, the second of which alone pushes along x too, under two points.
+#[test]
+fn shares_angles_and_power_are_those_by_hand() {
+    let (up, along_x, along_y) = ([1.0, 0.5, 0.8, 0.8], [0.0, 0.5, 0.0, -0.6], [0.0; 4]);
+    let problem = ForceProblem {
+        forces_n_per_a: &up,
+        height_m: &[0.5, 1.0],
+        offset_n: None,
+        weights: Some(&[1.0, 3.0]),
+        lower_a: &[-9.0; 2],
+        upper_a: &[9.0; 2],
+        total_max_a: None,
+        resistance_ohm: &[1.0, 4.0],
+    };
+    let fixed = [0.25, 0.5];
+    let found = sideways(&problem, [&along_x, &along_y], 0.8, &fixed, &[0, 1]);
+    let found = found.unwrap().unwrap();
+    let near = |found: f64, by_hand: f64| {
+        assert!((found - by_hand).abs() < 1e-9, "{found}, not {by_hand}");
+    };
+    // Requested are 0.4 N once and 0.8 N three times.
+    let requested = 0.4_f64.powi(2) + 3.0 * 0.8_f64.powi(2);
+    let fixed_x: [f64; 2] = [0.25, -0.3];
+    let share = |x: [f64; 2]| ((x[0] * x[0] + 3.0 * x[1] * x[1]) / requested).sqrt();
+    near(found.static_share, share(fixed_x));
+    // Up there are 0.5 N and 0.6 N; of two angles the larger is the median.
+    let angles = [fixed_x[0].atan2(0.5), 0.3_f64.atan2(0.6)];
+    near(
+        found.static_median_deg,
+        angles[0].max(angles[1]).to_degrees(),
+    );
+    // Least power: currents go as force over resistance.
+    let least = |up: [f64; 2], force: f64| {
+        let scale = force / (up[0] * up[0] + up[1] * up[1] / 4.0);
+        [scale * up[0], scale * up[1] / 4.0]
+    };
+    let own = [least([1.0, 0.5], 0.4), least([0.8, 0.8], 0.8)];
+    near(
+        found.feedback_share,
+        share([0.5 * own[0][1], -0.6 * own[1][1]]),
+    );
+    // Nothing sideways: the first coil alone.
+    let watts = |[a, b]: [f64; 2]| a * a + 4.0 * b * b;
+    let alone = watts([0.4, 0.0]) + 3.0 * watts([1.0, 0.0]);
+    near(
+        found.vector_power_ratio,
+        alone / (watts(own[0]) + 3.0 * watts(own[1])),
+    );
+    near(found.feedback_reached, 1.0);
+    near(found.vector_reached, 1.0);
+}
