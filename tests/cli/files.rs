@@ -516,3 +516,15 @@ fn regression_force_was_advised_where_a_link_leads_to_a_file_that_is_not_ours() 
     place.run(&[&other[..], &["--force"]].concat()).ends(0);
     assert!(place.path("other.svg").is_symlink());
 }
+
+#[test]
+fn a_name_that_no_file_may_have_is_refused_with_what_to_do() {
+    let place = Place::new();
+    let name = format!("{}.csv", "n".repeat(300));
+    let args = ["discretize", "shapes/flat.toml", "--out", &name];
+    place
+        .run(&args)
+        .ends(4)
+        .says(&["the name is too long; choose a shorter one"]);
+    assert!(!place.path(&name).exists());
+}

@@ -86,6 +86,12 @@ pub enum WriteError {
         /// The target.
         path: PathBuf,
     },
+    /// A name of more bytes than the file system takes.
+    #[error("cannot write {path}: the name is too long; choose a shorter one")]
+    LongName {
+        /// The target.
+        path: PathBuf,
+    },
     /// The content itself could not be made.
     #[error("cannot write {path}: {message}")]
     Content {
@@ -138,6 +144,7 @@ impl WriteError {
                 Self::ReadOnly { path }
             }
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull { path },
+            io::ErrorKind::InvalidFilename => Self::LongName { path },
             io::ErrorKind::NotADirectory => Self::NotFolder { path },
             io::ErrorKind::IsADirectory => Self::IsFolder { path },
             io::ErrorKind::InvalidData => Self::Content {
