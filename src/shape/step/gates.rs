@@ -32,6 +32,8 @@ pub(super) struct Part {
     pub(super) area: f64,
     /// Exact volume.
     pub(super) volume: f64,
+    /// Read again in another way, since the first one gave an invalid body.
+    pub(super) mended: bool,
 }
 
 /// Closes a body whose faces do not quite meet. An edge where the body touches itself has four
@@ -197,9 +199,15 @@ pub(super) fn check(part: &mut Part) -> Result<Verdict, String> {
             part.area
         ));
     }
-    Ok(Verdict {
-        crossings: crossings(&part.triangles, &names, part.deviation.max(reach)).pairs,
-    })
+    let crossings = crossings(&part.triangles, &names, part.deviation.max(reach)).pairs;
+    // A hole taken for more of its face gives a closed mesh that lies over itself.
+    if part.mended && crossings > 0 {
+        return Err(format!(
+            "OpenCASCADE cannot tell the holes of its faces from the faces ({crossings} pairs of facets \
+             pass through each other)"
+        ));
+    }
+    Ok(Verdict { crossings })
 }
 
 #[cfg(test)]
@@ -219,7 +227,21 @@ mod tests {
             deviation: 0.01,
             area,
             volume,
+            mended: false,
         }
+    }
+
+    /// A ball with a hole through it was read as the ball with the plug of the hole added.
+    #[test]
+    fn a_body_that_was_read_again_may_not_lie_over_itself() {
+        let mut triangles = block([0.0; 3], [0.7, 1.3, 0.9]);
+        triangles.extend(block([0.2, 0.3, 0.1], [0.3, 0.4, 1.7]));
+        let area = 2.0 * (0.7 * 1.3 + 0.7 * 0.9 + 1.3 * 0.9 + 0.3 * 0.4 + 0.3 * 1.7 + 0.4 * 1.7);
+        let mut twice = part(triangles, area, 0.819 + 0.204);
+        assert!(check(&mut twice).unwrap().crossings > 0);
+        twice.mended = true;
+        let why = check(&mut twice).unwrap_err();
+        assert!(why.contains("holes of its faces"), "{why}");
     }
 
     #[test]

@@ -31,7 +31,7 @@ const LONGEST_LINE: u64 = 64 << 20;
 /// Most facets that are taken of one file.
 const MOST_FACETS: usize = 50_000_000;
 
-const ADVICE: &str = "save the body as 3MF or STL in the CAD program instead";
+pub(super) const ADVICE: &str = "save the body as 3MF or STL in the CAD program instead";
 const INSTALL: &str = "STEP is read by OpenCASCADE, which Python brings: `python3 -m pip install \
                        cadquery-ocp`, or name a Python that has it in FLUXFORM_PYTHON";
 
@@ -78,6 +78,8 @@ pub(super) struct Reply {
     pub(super) loose: usize,
     /// Placements of the file's own, outside assemblies, that are not its frame itself.
     pub(super) moved_roots: usize,
+    /// Bodies that do not pass OpenCASCADE's own check, though no face is taken for what it leaves out.
+    pub(super) invalid: usize,
     pub(super) bodies: Vec<PlacedBody>,
     /// The different bodies; each is placed once or more often.
     pub(super) parts: Vec<Part>,
@@ -111,6 +113,7 @@ struct Figures {
     chord_mm: f64,
     loose: usize,
     moved_roots: usize,
+    invalid: usize,
     bodies: Vec<PlacedBody>,
     parts: Vec<PartFigures>,
 }
@@ -124,6 +127,7 @@ struct PartFigures {
     deviation: f64,
     area: f64,
     volume: f64,
+    mended: bool,
 }
 
 /// Messages of the thread that listens.
@@ -378,6 +382,7 @@ fn parts(from: &mut impl Read, figures: &Figures) -> Option<Vec<Part>> {
             deviation: part.deviation,
             area: part.area,
             volume: part.volume,
+            mended: part.mended,
         })
     };
     figures.parts.iter().map(one).collect()
@@ -396,6 +401,7 @@ fn reply(version: String, figures: Figures, parts: Vec<Part>) -> Option<Reply> {
         chord_mm: figures.chord_mm,
         loose: figures.loose,
         moved_roots: figures.moved_roots,
+        invalid: figures.invalid,
         bodies: figures.bodies,
         parts,
     })

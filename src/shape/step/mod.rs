@@ -60,14 +60,17 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         bodies: bodies.len(),
         loose: reply.loose,
         moved_roots: reply.moved_roots,
+        invalid: reply.invalid,
         crossing: 0,
         deviation_mm: 0.0,
         asked_mm: (options.chord_m).map_or(reply.chord_mm, |chord_m| chord_m * 1e3),
     };
     for (index, part) in parts.iter_mut().enumerate() {
         let name = bodies.iter().find(|body| body.part == index);
-        let verdict = gates::check(part)
-            .map_err(|what| format!("body `{}`: {what}", name.map_or("", |body| &body.name)))?;
+        let verdict = gates::check(part).map_err(|what| {
+            let name = name.map_or("", |body| &body.name);
+            format!("body `{name}`: {what}; {}", kernel::ADVICE)
+        })?;
         judged.crossing += verdict.crossings;
         judged.deviation_mm = judged.deviation_mm.max(part.deviation);
     }
@@ -119,6 +122,7 @@ struct Judged {
     bodies: usize,
     loose: usize,
     moved_roots: usize,
+    invalid: usize,
     crossing: usize,
     deviation_mm: f64,
     asked_mm: f64,
@@ -131,6 +135,7 @@ impl Judged {
             bodies,
             loose,
             moved_roots,
+            invalid,
             crossing,
             deviation_mm,
             asked_mm,
@@ -147,6 +152,12 @@ impl Judged {
             warnings.push(format!(
                 "the file states {moved_roots} placements at its root that move nothing by the standard; \
                  a program that applies them puts the part elsewhere: compare where it lies"
+            ));
+        }
+        if *invalid > 0 {
+            warnings.push(format!(
+                "{invalid} bodies do not pass OpenCASCADE's own check: compare volume and picture with the CAD \
+                 program's"
             ));
         }
         if *crossing > 0 {

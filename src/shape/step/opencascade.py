@@ -57,12 +57,14 @@ try:
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
     from OCP.BRepBndLib import BRepBndLib
+    from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError, BRepCheck_Wire
     from OCP.BRepGProp import BRepGProp
     from OCP.BRepTools import BRepTools
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.GProp import GProp_GProps
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.IMeshTools import IMeshTools_Parameters
+    from OCP.Interface import Interface_Static
     from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
     from OCP.GeomAbs import GeomAbs_Plane
     from OCP.Quantity import Quantity_Color
@@ -71,7 +73,7 @@ try:
     from OCP.TDataStd import TDataStd_Name
     from OCP.TDF import TDF_ChildIterator, TDF_Label
     from OCP.TDocStd import TDocStd_Document
-    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
@@ -97,6 +99,7 @@ def static(owner, name):
 triangulation = static(BRep_Tool, "Triangulation")
 as_face = static(TopoDS, "Face")
 as_edge = static(TopoDS, "Edge")
+as_wire = static(TopoDS, "Wire")
 surface_properties = static(BRepGProp, "SurfaceProperties")
 volume_properties = static(BRepGProp, "VolumeProperties")
 
@@ -116,6 +119,9 @@ BEYOND_SAMPLES = 1.25
 ATTEMPTS = [(1.0, False), (4.0, False), (1.0, True), (4.0, True), (0.25, False)]
 # Relative error of exact areas and volumes; without one OpenCASCADE errs by percents on threads.
 INTEGRATED = 1e-3
+# How curves on surfaces are read, by OpenCASCADE's `read.surfacecurve.mode`: those of the file first, then
+# made again from the curves in space. Of the first it may lose the seam of a closed face.
+CURVES = (0, 3)
 # Most halvings of a side, and most facets of a face that are split further.
 ROUNDS = 12
 MOST_FACETS = 400_000
@@ -124,10 +130,11 @@ MOST_FACETS = 400_000
 # ------------------------------------------------------------------ reading
 
 
-def read(data):
-    """The reader with the file's products, and the millimetres of the file's unit of length."""
+def read(data, curves):
+    """The document with the file's products, and the millimetres of the file's unit of length."""
     send(stage={"name": "STEP", "done": 0, "total": 1})
     reader = STEPCAFControl_Reader()
+    static(Interface_Static, "SetIVal")("read.surfacecurve.mode", curves)
     reader.SetNameMode(True)
     reader.SetColorMode(True)
     for mode in ("SetGDTMode", "SetMatMode", "SetViewMode", "SetPropsMode", "SetLayerMode"):
@@ -286,6 +293,53 @@ class Products:
                 found.append((solid.Located(TopLoc_Location()), place, name, self.color(solid)))
             self.parts[key] = found
         return self.parts[key]
+
+
+def faults(products):
+    """The parts' bodies that are invalid by OpenCASCADE's own check: the first face of each whose border
+    runs the wrong way around, so that it is what the face leaves out, or None."""
+    found = {}
+    for body in products.bodies:
+        if body["part"] in found:
+            continue
+        check = BRepCheck_Analyzer(body["shape"])
+        if check.IsValid():
+            continue
+        found[body["part"]] = None
+        for number, face in enumerate(explored(body["shape"], TopAbs_FACE), 1):
+            # A valid face needs no second look.
+            if not check.IsValid(face) and turned(as_face(face)):
+                found[body["part"]] = number
+                break
+    return found
+
+
+def turned(face):
+    """Whether a border of the face is open or runs the wrong way around."""
+    for wire in explored(face, TopAbs_WIRE):
+        check = BRepCheck_Wire(as_wire(wire))
+        states = (check.Closed(), check.Closed2d(face), check.Orientation(face))
+        if any(state != BRepCheck_NoError for state in states):
+            return True
+    return False
+
+
+def soundest(data):
+    """The file's products, read in the way that leaves fewest faults; these, the parts of which another
+    way had faults, and the unit, mm."""
+    best, faulty = None, set()
+    for curves in CURVES:
+        document, unit_mm = read(data, curves)
+        products = Products(document)
+        found = faults(products)
+        rank = (sum(face is not None for face in found.values()), len(found))
+        if best is None or rank < best[0]:
+            # The shapes live as long as their document.
+            best = rank, products, found, unit_mm, document
+        if not found:
+            break
+        faulty.update(label for label, _ in found)
+    return best[1:4] + (faulty, best[4])
 
 
 # ------------------------------------------------------------------ meshing and measuring
@@ -594,8 +648,7 @@ def chosen(bodies, which):
 def main():
     chord = float(sys.argv[1])
     data = sys.stdin.buffer.read()
-    document, unit_mm = read(data)
-    products = Products(document)
+    products, found, unit_mm, faulty, document = soundest(data)
     bodies = chosen(products.bodies, sys.argv[4])
     if chord == 0.0:
         box = Bnd_Box()
@@ -606,9 +659,15 @@ def main():
     for number, body in enumerate(bodies):
         send(stage={"name": "bodies", "done": number, "total": len(bodies)})
         key = body["part"]
+        if found.get(key) is not None:
+            refuse(
+                f"body {number + 1} `{body['name']}`: OpenCASCADE takes the border of its face "
+                f"{found[key]} the wrong way around, and so the wrong part of the face"
+            )
         if key not in parts:
             try:
                 parts[key] = meshed(body["shape"], chord)
+                parts[key]["mended"] = key[0] in faulty and key not in found
             except Wrong as wrong:
                 refuse(f"body {number + 1} `{body['name']}`: {wrong}")
         move = body["place"].Transformation()
@@ -623,7 +682,8 @@ def main():
     figures = [{k: len(v) if k in lists else v for k, v in part.items()} for part in parts.values()]
     send(result={
         "unit_mm": unit_mm, "chord_mm": chord, "loose": products.loose,
-        "moved_roots": moved_roots(data), "bodies": stated, "parts": figures,
+        "moved_roots": moved_roots(data), "invalid": sum(body["part"] in found for body in bodies),
+        "bodies": stated, "parts": figures,
     })
     for part in parts.values():
         for name in lists:

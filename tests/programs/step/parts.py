@@ -62,6 +62,29 @@ def dome():
     return BRepAlgoAPI_Fuse(BRepAlgoAPI_Fuse(block, sphere).Shape(), ring).Shape()
 
 
+def ball():
+    return BRepPrimAPI_MakeSphere(gp_Pnt(0, 0, 0), 40.0).Shape()
+
+
+def bore(radius, x, y, lean):
+    """A cylinder about a line through (x, y, 0) that leans towards x, radians."""
+    way = gp_Dir(math.sin(lean), 0, math.cos(lean))
+    low = gp_Pnt(x - 100 * math.sin(lean), y, -100 * math.cos(lean))
+    return BRepPrimAPI_MakeCylinder(gp_Ax2(low, way), radius, 200.0).Shape()
+
+
+def drilled():
+    """A ball with a hole beside its middle, whose edges cross the seam of the ball."""
+    return BRepAlgoAPI_Cut(ball(), bore(5.0, 20, 2, 0.0)).Shape()
+
+
+def slanted():
+    """The ball as a rational B-spline, its hole slanted: OpenCASCADE reads it wrong in each of its ways."""
+    splines = BRepBuilderAPI_NurbsConvert(ball(), True).Shape()
+    shift = bore(10.0, 100 * math.sin(0.3), 0, 0.3)
+    return BRepAlgoAPI_Cut(splines, shift).Shape()
+
+
 def named(label, text):
     static(TDataStd_Name, "Set")(label, TCollection_ExtendedString(text))
 
@@ -93,4 +116,6 @@ write(box, "inch", "INCH")
 write(box, "box")
 write(nut(), "nut")
 write(dome(), "dome")
+write(drilled(), "drilled")
+write(slanted(), "slanted")
 assembly()
