@@ -4,7 +4,7 @@ import math
 import sys
 
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+from OCP.BRepBuilderAPI import BRepBuilderAPI_GTransform, BRepBuilderAPI_NurbsConvert
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCone,
@@ -21,7 +21,7 @@ from OCP.TDataStd import TDataStd_Name
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
-from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_GTrsf, gp_Pnt, gp_Trsf, gp_Vec
 
 FOLDER = sys.argv[1]
 
@@ -85,6 +85,14 @@ def slanted():
     return BRepAlgoAPI_Cut(splines, shift).Shape()
 
 
+def egg():
+    """The ball stretched to the semi-axes 60, 32 and 24."""
+    stretch = gp_GTrsf()
+    for k, factor in enumerate((1.5, 0.8, 0.6), 1):
+        stretch.SetValue(k, k, factor)
+    return BRepBuilderAPI_GTransform(ball(), stretch, True).Shape()
+
+
 def named(label, text):
     static(TDataStd_Name, "Set")(label, TCollection_ExtendedString(text))
 
@@ -118,4 +126,5 @@ write(nut(), "nut")
 write(dome(), "dome")
 write(drilled(), "drilled")
 write(slanted(), "slanted")
+write(egg(), "egg")
 assembly()
