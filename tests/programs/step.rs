@@ -27,6 +27,7 @@ pub fn trials() -> Vec<Trial> {
             a_drilled_ball_is_not_its_plug,
             a_hole_that_opencascade_adds_to_the_body_is_refused,
             an_egg_has_its_volume,
+            the_default_chord_is_of_the_box_of_the_body,
             facets_of_splines_and_tori_lie_within_the_stated_chord,
             an_assembly_has_its_placements_names_and_colours,
             angles_in_degrees_are_read,
@@ -324,6 +325,18 @@ fn an_egg_has_its_volume() {
     let volume = surface["volume"].as_f64().unwrap();
     let exact = 4.0 / 3.0 * std::f64::consts::PI * 60.0 * 32.0 * 24.0;
     assert!((volume - exact).abs() < 2e-3 * exact, "{volume} {exact}");
+}
+
+/// It was half as long again: of the box of the egg's poles.
+fn the_default_chord_is_of_the_box_of_the_body() {
+    let folder = parts();
+    let grid = ["--grid", "5x5", "--rest-on", "0mm"];
+    let (_, stated) = heights("egg.step", &grid, folder.path());
+    let chord = 2.0 * (60.0f64 * 60.0 + 32.0 * 32.0 + 24.0 * 24.0).sqrt() / 4000.0;
+    assert!(
+        stated <= 1.001 * chord && stated > 0.5 * chord,
+        "{stated} {chord}"
+    );
 }
 
 fn facets_of_splines_and_tori_lie_within_the_stated_chord() {

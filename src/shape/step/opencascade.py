@@ -654,7 +654,9 @@ def main():
     if chord == 0.0:
         box = Bnd_Box()
         for body in bodies:
-            static(BRepBndLib, "Add")(body["shape"].Moved(body["place"]), box, False)
+            # The box that is quick to have holds the poles of splines, far out.
+            moved = body["shape"].Moved(body["place"])
+            static(BRepBndLib, "AddOptimal")(moved, box, False, False)
         chord = CHORD * diagonal(box)
     parts, stated = {}, []
     for number, body in enumerate(bodies):
