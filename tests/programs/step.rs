@@ -28,6 +28,7 @@ pub fn trials() -> Vec<Trial> {
             a_hole_that_opencascade_adds_to_the_body_is_refused,
             an_egg_has_its_volume,
             the_default_chord_is_of_the_box_of_the_body,
+            the_tip_of_a_cone_is_met_and_nothing_crosses_there,
             facets_of_splines_and_tori_lie_within_the_stated_chord,
             an_assembly_has_its_placements_names_and_colours,
             angles_in_degrees_are_read,
@@ -337,6 +338,25 @@ fn the_default_chord_is_of_the_box_of_the_body() {
         stated <= 1.001 * chord && stated > 0.5 * chord,
         "{stated} {chord}"
     );
+}
+
+/// Facets at the tip were said to lie 0.3 mm off, and to pass through each other: the angle that the tip
+/// has of its own is any.
+fn the_tip_of_a_cone_is_met_and_nothing_crosses_there() {
+    let folder = parts();
+    let surface = &inspected("cone.step", &[], folder.path())["surface"];
+    let warnings = surface["warnings"].to_string();
+    assert!(!warnings.contains("pass through each other"), "{warnings}");
+    assert!(!warnings.contains("lie up to"), "{warnings}");
+    let (rows, stated) = heights("cone.step", &["--grid", "31x31"], folder.path());
+    assert!(stated < 0.0261, "{stated}");
+    for [x, y, height] in rows {
+        let exact = 60.0 - 2.0 * x.hypot(y);
+        assert!(
+            (height - exact).abs() < 3.0 * stated,
+            "{x} {y} {height} {exact}"
+        );
+    }
 }
 
 fn facets_of_splines_and_tori_lie_within_the_stated_chord() {

@@ -199,7 +199,12 @@ pub(super) fn check(part: &mut Part) -> Result<Verdict, String> {
             part.area
         ));
     }
-    let crossings = crossings(&part.triangles, &names, part.deviation.max(reach)).pairs;
+    // Within the deviation crossings may be of the mesh alone, and the two sides of a thin wall seem one.
+    let pairs = |reach| crossings(&part.triangles, &names, reach).pairs;
+    let crossings = match pairs(part.deviation.max(reach)) {
+        0 => 0,
+        wide => wide.min(pairs(reach)),
+    };
     // A hole taken for more of its face gives a closed mesh that lies over itself.
     if part.mended && crossings > 0 {
         return Err(format!(
@@ -242,6 +247,15 @@ mod tests {
         twice.mended = true;
         let why = check(&mut twice).unwrap_err();
         assert!(why.contains("holes of its faces"), "{why}");
+    }
+
+    /// Facets at the tip of a cone, less than the deviation apart, were said to pass through each other.
+    #[test]
+    fn a_wall_thinner_than_the_deviation_does_not_cross_itself() {
+        let plate = block([0.0; 3], [0.7, 1.3, 0.006]);
+        let area = 2.0 * (0.7 * 1.3 + 0.7 * 0.006 + 1.3 * 0.006);
+        let mut thin = part(plate, area, 0.7 * 1.3 * 0.006);
+        assert_eq!(check(&mut thin).unwrap().crossings, 0);
     }
 
     #[test]

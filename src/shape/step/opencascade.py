@@ -55,7 +55,7 @@ try:
     import OCP
     from OCP.Bnd import Bnd_Box
     from OCP.BRep import BRep_Tool
-    from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+    from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError, BRepCheck_Wire
     from OCP.BRepGProp import BRepGProp
@@ -402,6 +402,8 @@ class Face:
         place = TopLoc_Location()
         self.mesh = triangulation(face, place)
         self.points, self.triangles = [], []
+        # Nodes at which a parameter is any of its values: the tip of a cone, the pole of a sphere.
+        self.any = {}
         self.deviation = self.area = 0.0
         exact = GProp_GProps()
         surface_properties(face, exact, INTEGRATED)
@@ -421,9 +423,33 @@ class Face:
         for k in range(1, self.mesh.NbTriangles() + 1):
             a, b, c = self.mesh.Triangle(k).Get()
             self.triangles.append((a - 1, b - 1, c - 1))
+        self.find_tips(place)
         self.refine()
         self.measure_edges(place)
         self.check_area()
+
+    def find_tips(self, place):
+        """Nodes on edges without length, and which parameter runs along these."""
+        for edge in explored(self.face, TopAbs_EDGE):
+            edge = as_edge(edge)
+            if not static(BRep_Tool, "Degenerated")(edge):
+                continue
+            border = static(BRep_Tool, "PolygonOnTriangulation")(edge, self.mesh, place)
+            if border is None:
+                continue
+            curve = BRepAdaptor_Curve2d(edge, self.face)
+            a, b = curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())
+            runs = 0 if abs(b.X() - a.X()) > abs(b.Y() - a.Y()) else 1
+            self.any.update((border.Node(k) - 1, runs) for k in range(1, border.NbNodes() + 1))
+
+    def between(self, uv, nodes):
+        """The mean parameters of nodes; a parameter that is arbitrary at a node is that of the others."""
+        mean = []
+        for k in (0, 1):
+            known = [uv[node][k] for node in nodes if self.any.get(node) != k]
+            known = known or [uv[node][k] for node in nodes]
+            mean.append(sum(known) / len(known))
+        return mean
 
     def refine(self):
         """Splits facets until the surface lies within the chord of them; no facet looks backwards.
@@ -486,7 +512,7 @@ class Face:
         if twice == 0.0:
             return 0.0, along
         longest = max(self.length(side) for side in along)
-        u, v = (sum(uv[k][i] for k in ijk) / 3.0 for i in (0, 1))
+        u, v = self.between(uv, ijk)
         at, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
         surface.D1(u, v, at, du, dv)
         outward = cross(numbers(du), numbers(dv))
@@ -503,8 +529,7 @@ class Face:
 
         for i, j in along:
             if (i, j) not in middles:
-                u, v = (0.5 * (uv[i][k] + uv[j][k]) for k in (0, 1))
-                middles[i, j] = numbers(surface.Value(u, v))
+                middles[i, j] = numbers(surface.Value(*self.between(uv, (i, j))))
             along[i, j] = off(middles[i, j], middle(self.points[i], self.points[j]))
         return off(numbers(at), middle(a, b, c)), along
 
@@ -514,7 +539,7 @@ class Face:
         for i, j in sorted(marked):
             halves[i, j] = len(self.points)
             self.points.append(middles[i, j])
-            uv.append(tuple(0.5 * (uv[i][k] + uv[j][k]) for k in (0, 1)))
+            uv.append(tuple(self.between(uv, (i, j))))
         whole, new = [], []
         for ijk in self.triangles:
             cut = [halves.get(side) for side in sides(ijk)]
