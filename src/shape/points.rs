@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::certificate::{Certificate, Certify, by_cell, certify};
+use crate::certificate::{Certificate, Certify, by_cell, certify, stated_tessellation};
 use crate::deviation::CERTIFY_SECONDS;
 use crate::document::{AxisRequest, ShapeDocument};
 use crate::error::ShapeError;
@@ -308,8 +308,13 @@ pub fn discretize_surface(
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
             mesh.read_by().map(str::to_owned),
-            "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
-             multiplies it; the tessellation's own deviation is not in the file)",
+            if stated_tessellation(mesh.facts()).is_some() {
+                "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
+                 multiplies it)"
+            } else {
+                "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
+                 multiplies it; the tessellation's own deviation is not in the file)"
+            },
         ),
         Surface::Primitive(_) => (None, None, "a-priori: a closed formula in double precision"),
     };

@@ -7,6 +7,7 @@ use clap::Args;
 use super::scattered::{self, ScatteredSummary};
 use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with};
 use crate::RunError;
+use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::cli::args::{ErrorFlags, SamplingFlags, SurfaceFlags, WeightsFlag, Writing};
@@ -333,10 +334,8 @@ impl Discretize {
             );
         }
         if let Some(stage) = summary.accuracy.get("points") {
-            sheet.line(
-                "accuracy",
-                &format!("heights to {}", length_error(stage.estimate)),
-            );
+            let facets = summary.accuracy.get("tessellation");
+            sheet.line("accuracy", &heights_to(stage, facets));
         }
         if let FileArgument::Path(path) = &self.out {
             let summary = path.with_extension("json");
@@ -350,6 +349,19 @@ impl Discretize {
         }
         sheet.finish()
     }
+}
+
+/// The error of the heights against the facets, and how far these lie from the surface they stand for.
+fn heights_to(points: &StageAccuracy, facets: Option<&StageAccuracy>) -> String {
+    let heights = format!("heights to {}", length_error(points.estimate));
+    let Some(facets) = facets.filter(|facets| facets.estimate > 0.0) else {
+        return heights;
+    };
+    let how = facets.method.split(':').next().unwrap_or_default();
+    format!(
+        "{heights} of the facets, which lie within {} of the surface that they stand for ({how})",
+        length_error(facets.estimate)
+    )
 }
 
 /// How far bilinear interpolation departs from the surface.
