@@ -145,8 +145,9 @@ fn a_curve_that_starts_level_gives_numbers() {
     // Broke: its infinite permeability at the origin made the linear steel it is compared with NaN.
     let place = Place::new();
     let rows = "0,0\n0.2,10\n0.3,200\n1.0,1500\n1.5,5000\n1.8,20000\n";
-    let ran = with_table(&place, rows);
-    ran.ends(0).says(&["starts level"]);
+    let ran = with_table(&place, rows).ends(0).says(&["starts level"]);
+    let material = "infinite permeability, computed with 1e9";
+    assert!(ran.out.contains(material), "{}", ran.out);
     let ran = place.run(&["evaluate", "design.toml", "--format", "json"]);
     ran.ends(0);
 }

@@ -395,11 +395,15 @@ fn points_of_another_plan_are_refused() {
         .ends(4)
         .says(&["another plan", "p/plan.json"]);
     place.run(&[&run[..], &["--force"]].concat()).ends(0);
-    for plan in ["plan.json", "other.json"] {
+    // The folder is the other plan's by now, and has points of both.
+    for (plan, why) in [
+        ("plan.json", "the folder holds another sweep"),
+        ("other.json", "belongs to another plan"),
+    ] {
         place
             .run(&["sweep", "merge", plan, "p", "--partial"])
             .ends(4)
-            .says(&["another plan"]);
+            .says(&[why]);
     }
 }
 

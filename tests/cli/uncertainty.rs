@@ -185,7 +185,9 @@ fn regression_the_plot_shows_another_error_than_currents_are_chosen_for() {
     let shape = flat(&place);
     let upward = |force: &str| {
         let args = ["calibrate", SEED, shape, "--sensor-error", "4mm"];
-        place.run(&[&args[..], &["--force-direction", force, "--force"]].concat());
+        place
+            .run(&[&args[..], &["--force-direction", force, "--force"]].concat())
+            .ends(0);
         let plot = place.text("results/seed_air/flat/plots/uncertainty.svg");
         let page = place.text("results/seed_air/flat/report.html");
         ["upward error", "least error of the upward force"]

@@ -276,9 +276,9 @@ impl Refined {
     /// As the result states it.
     pub fn summary(&self) -> Reference {
         let field = if self.in_air {
-            "the windings' field to 1e-12 or a tenth of the present tolerance"
+            format!("the windings' field to {:e}", self.tolerance)
         } else {
-            "the field to a tenth of the present tolerance or less"
+            "the field to a tenth of the present tolerance or less".to_owned()
         };
         let left_out = match self.places.out_of_reach {
             0 => String::new(),
