@@ -149,7 +149,7 @@ impl From<Cause> for FeltCause {
 }
 
 /// Errors of the force vector relative to the requested one, with each kind of currents.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FeltShares {
     /// With the static currents.
     #[serde(rename = "static")]
@@ -197,6 +197,10 @@ pub struct FeltForce {
     pub total: FeltShares,
     /// Root mean square over the points and the uncertainties, relative to that of the requested force.
     pub expected: FeltShares,
+    /// By how much `expected` may be off, being that of some points of the object; absent in files of programs without
+    /// it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<FeltShares>,
     /// The same split: the computation adds up with the others, whose squares do.
     pub parts: Vec<FeltPart>,
     /// Effects that none of the parts covers.
@@ -216,10 +220,14 @@ const NOT_MODELLED: [&str; 6] = [
 ];
 
 impl FeltForce {
-    /// Of currents whose errors without any uncertainty are given, and with those of `study`. `pull_share` is that of
-    /// the unpowered steel's sideways pull, where its upward one counts.
+    /// Of currents whose errors without any uncertainty are given with those of their sampling, and with those of
+    /// `study`. `pull_share` is that of the unpowered steel's sideways pull, where its upward one counts.
     #[must_use]
-    pub fn new(exact: FeltShares, study: Option<&Study>, pull_share: Option<f64>) -> Self {
+    pub fn new(
+        (exact, sampling): (FeltShares, FeltShares),
+        study: Option<&Study>,
+        pull_share: Option<f64>,
+    ) -> Self {
         let promised = |study: &Study| FeltShares {
             fixed: study.fixed.promised.expected,
             feedback: study.feedback.promised.expected,
@@ -250,6 +258,10 @@ impl FeltForce {
         Self {
             total: expected,
             expected,
+            sampling: match study {
+                Some(study) => study.sampling.map(FeltShares::from),
+                None => Some(sampling),
+            },
             parts: std::iter::once(own).chain(parts).collect(),
             not_modelled: (pull.into_iter().chain(not_given))
                 .chain(NOT_MODELLED.map(str::to_owned))

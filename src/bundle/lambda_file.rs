@@ -137,15 +137,12 @@ pub struct SampledPoints {
 /// requested force there. A pair in series counts as one coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FeedbackFile {
-    /// The largest that every point can be given, N/m; null where there is none above zero.
-    pub lambda_n_per_m: Option<f64>,
-    /// Why there is none; null where there is one.
-    pub reason: Option<String>,
+    /// The largest that every point can be given.
+    #[serde(flatten)]
+    pub largest: LargestGiven,
     /// The smallest that every point can be given, N/m: above zero only where a force without
     /// currents is too strong.
     pub smallest_lambda_n_per_m: f64,
-    /// Where the largest is decided.
-    pub decided_at: Option<FeedbackPlace>,
     /// The static currents at the chosen lambda; null without one.
     pub without: Option<StaticRendering>,
     /// With feedback at the same lambda; null without one.
@@ -171,12 +168,9 @@ pub struct VectorFeedbackFile {
     /// How large a force along the normal is; absent for other directions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_force: Option<NormalForce>,
-    /// The largest at which every point gets its vector, N/m; null where there is none above zero.
-    pub lambda_n_per_m: Option<f64>,
-    /// Why there is none; null where there is one.
-    pub reason: Option<String>,
-    /// Where the largest is decided.
-    pub decided_at: Option<FeedbackPlace>,
+    /// The largest at which every point gets its vector.
+    #[serde(flatten)]
+    pub largest: LargestGiven,
     /// The static currents at the chosen lambda; null without one, as the next two.
     #[serde(rename = "static")]
     pub fixed: Option<VectorRendering>,
@@ -189,6 +183,17 @@ pub struct VectorFeedbackFile {
     pub vector: Option<VectorRendering>,
     /// The same at its own largest lambda; null without one.
     pub at_largest: Option<VectorRendering>,
+}
+
+/// The largest force constant that all points can be given; a place between them may allow less.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LargestGiven {
+    /// N/m; null where there is none above zero.
+    pub lambda_n_per_m: Option<f64>,
+    /// Why there is none; null where there is one.
+    pub reason: Option<String>,
+    /// Where it is decided.
+    pub decided_at: Option<FeedbackPlace>,
 }
 
 /// A place that decides.
@@ -230,16 +235,13 @@ pub struct FeedbackShell {
     pub clipped: usize,
     /// Places in all.
     pub places: usize,
-    /// The largest that every place can be given, N/m; null where there is none above zero.
-    pub lambda_n_per_m: Option<f64>,
-    /// Why there is none; null where there is one.
-    pub reason: Option<String>,
+    /// The largest that every place can be given.
+    #[serde(flatten)]
+    pub largest: LargestGiven,
     /// The smallest that every place can be given, N/m.
     pub smallest_lambda_n_per_m: f64,
     /// The largest by every second layer, N/m.
     pub every_second_lambda_n_per_m: Option<f64>,
-    /// Where the largest is decided.
-    pub decided_at: Option<FeedbackPlace>,
 }
 
 /// The largest lambda up to which every point's error can be kept within

@@ -1,6 +1,8 @@
 //! Pieces of summaries that several commands print alike.
 
-use super::quantity::{count, error, length_error, mm, number, number_to, percent, share, si};
+use super::quantity::{
+    count, error, length_error, mm, number, number_to, percent, share, share_with_error, si,
+};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::headline::{BudgetPart, FeltForce, FeltPart, Headline};
 use crate::bundle::lambda_file::{LambdaFile, Sideways};
@@ -241,15 +243,14 @@ pub fn force_error(headline: &Headline) -> String {
 
 /// The felt error of the force vector with each kind of currents.
 pub fn felt(felt: &FeltForce) -> String {
-    let of = felt.total;
+    let (of, off) = (felt.total, felt.sampling.unwrap_or_default());
+    let fixed = share_with_error(of.fixed, off.fixed);
+    let feedback = share_with_error(of.feedback, off.feedback);
     let robust = of.robust.map_or_else(String::new, |of| {
-        format!(", {} with currents chosen for the uncertainties", share(of))
+        let share = share_with_error(of, off.robust.unwrap_or(0.0));
+        format!(", {share} with currents chosen for the uncertainties")
     });
-    format!(
-        "force vector off by {} with static currents, {} with feedback{robust}",
-        share(of.fixed),
-        share(of.feedback)
-    )
+    format!("force vector off by {fixed} with static currents, {feedback} with feedback{robust}")
 }
 
 /// The same split by cause, in the same order.

@@ -121,6 +121,30 @@ pub fn share(part: f64) -> String {
     format!("{} %", number_to(part * 100.0, 2))
 }
 
+/// A share with its error, where that is more than half of the last digit.
+#[must_use]
+pub fn share_with_error(part: f64, error: f64) -> String {
+    if part > 0.0 && error > 0.5 * last_digit(part) {
+        return format!("{} %", with_error(100.0 * part, 100.0 * error));
+    }
+    share(part)
+}
+
+/// A share in the digits of which the last is off by five at most.
+#[must_use]
+pub fn share_within(part: f64, error: f64) -> String {
+    let known = 10f64.powf((error / 5.0).log10().ceil());
+    if part > 0.0 && known > last_digit(part) {
+        return share((part / known).round().max(1.0) * known);
+    }
+    share(part)
+}
+
+/// The unit of the last digit that [`share`] prints.
+fn last_digit(part: f64) -> f64 {
+    10f64.powf(part.log10().floor() - 1.0).min(0.01)
+}
+
 /// A file size.
 #[must_use]
 pub fn bytes(bytes: u64) -> String {
@@ -142,6 +166,21 @@ mod tests {
     use super::*;
 
     /// A box that rests on zero printed as one from -1.7764e-15 mm on.
+    #[test]
+    fn shares_have_the_digits_that_are_known() {
+        for (part, error, with, within) in [
+            (1.113, 0.004, "111 %", "111 %"),
+            (0.362, 0.009, "36.2 +- 0.9 %", "36 %"),
+            (0.113, 0.015, "11.3 +- 1.5 %", "11 %"),
+            (1.6, 0.9, "160 +- 90 %", "200 %"),
+            (0.02, 0.3, "0 +- 30 %", "10 %"),
+            (0.0, 0.0, "0 %", "0 %"),
+        ] {
+            assert_eq!(share_with_error(part, error), with);
+            assert_eq!(share_within(part, error), within);
+        }
+    }
+
     #[test]
     fn what_rounding_left_of_zero_prints_as_zero() {
         let printed = extents([-1.7764e-15, -5.0, 1e-7], [20.0, 5.3, 31.0]);

@@ -66,6 +66,7 @@ mod power;
 mod problem;
 mod qr_reduction;
 mod rest;
+pub mod sampling;
 pub mod sideways;
 mod solve;
 pub mod two_fingers;

@@ -13,7 +13,7 @@ use super::vector_allocation::VectorAllocator;
 /// push; angles are between the given force and upward, medians over the points above height 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sideways {
-    /// Points looked at, evenly among all; with feedback up to a thousand of them.
+    /// Points looked at, evenly among all; for feedback without any sideways force up to a thousand of them.
     pub points: usize,
     /// Share with the static currents.
     pub static_share: f64,
@@ -99,13 +99,16 @@ impl Given {
         }
     }
 
-    fn count(&mut self, at: &Point, reach: Reach, (currents, ohm): (&[f64], &[f64])) {
+    /// Gives the weighted power of the point.
+    fn count(&mut self, at: &Point, reach: Reach, (currents, ohm): (&[f64], &[f64])) -> f64 {
         let heat = currents.iter().zip(ohm).map(|(i, ohm)| ohm * i * i);
-        self.power += at.weight * heat.sum::<f64>();
+        let power = at.weight * heat.sum::<f64>();
+        self.power += power;
         self.weights += at.weight;
         if reach == Reach::Reached {
             self.reached += at.weight;
         }
+        power
     }
 
     fn share(&self) -> f64 {
@@ -125,8 +128,8 @@ impl Given {
 }
 
 /// The sideways force of `problem`, whose forces per ampere along x and y are `side_n_per_a`, each
-/// [point, coil], at `lambda_n_per_m` with static currents, and at the points `followed` with feedback. `None` where no
-/// force is requested.
+/// [point, coil], at `lambda_n_per_m` with static currents and with feedback of the upward force, and at the points
+/// `followed`, which ascend, with feedback of all three components. `None` where no force is requested.
 ///
 /// # Errors
 /// Where the problem is malformed.
@@ -149,18 +152,21 @@ pub fn sideways(
     let mut currents = vec![0.0; coils];
     let mut rows = vec![[0.0; 3]; coils];
     let [mut fixed, mut of_upward, mut of_vector]: [Given; 3] = Default::default();
+    let mut followed = followed.iter().peekable();
+    // Power is compared at the same points.
+    let mut power_of_upward = 0.0;
     for point in 0..problem.points() {
+        fluxform_base::progress::poll();
         let at = Point::of(problem, side_n_per_a, lambda_n_per_m, point);
         at.fill(&mut rows);
         fixed.add(&at, &rows, static_currents_a);
-    }
-    for point in followed {
-        fluxform_base::progress::poll();
-        let at = Point::of(problem, side_n_per_a, lambda_n_per_m, *point);
-        at.fill(&mut rows);
         let found = upward.allocate(at.axes[2], at.request_n - at.offset_n, &mut currents);
         of_upward.add(&at, &rows, &currents);
-        of_upward.count(&at, found.reach, (&currents, ohm));
+        let power = of_upward.count(&at, found.reach, (&currents, ohm));
+        if followed.next_if_eq(&&point).is_none() {
+            continue;
+        }
+        power_of_upward += power;
         let request = [0.0, 0.0, at.request_n - at.offset_n];
         let found = vector.allocate(&rows, request, &mut currents);
         of_vector.count(&at, found.reach, (&currents, ohm));
@@ -176,7 +182,7 @@ pub fn sideways(
         feedback_median_deg: of_upward.median_deg(),
         feedback_reached: of_upward.reached / of_upward.weights,
         vector_reached: of_vector.reached / of_vector.weights,
-        vector_power_ratio: of_vector.power / of_upward.power,
+        vector_power_ratio: of_vector.power / power_of_upward,
         pull_share: None,
     }))
 }

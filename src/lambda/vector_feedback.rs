@@ -345,6 +345,7 @@ pub fn render_vectors_at(
 ) -> Result<VectorRendering, FeedbackError> {
     let vector = problem.allocator(SIDEWAYS_WEIGHT)?;
     let limits = &problem.upward;
+    let heaviest = limits.heaviest();
     let upward = Allocator::new(
         limits.resistance_ohm,
         limits.lower_a,
@@ -361,7 +362,10 @@ pub fn render_vectors_at(
                 rows: vec![[0.0; 3]; limits.coils()],
                 currents: vec![0.0; limits.coils()],
             };
-            let mut sums = Sums::default();
+            let mut sums = Sums {
+                heaviest,
+                ..Sums::default()
+            };
             for &point in points {
                 fluxform_base::progress::poll();
                 sums.add(problem, &mut given, point, lambda_n_per_m);
@@ -411,6 +415,8 @@ impl GivenCurrents<'_> {
 /// Sums over points.
 #[derive(Default)]
 struct Sums {
+    /// The largest weight of all points, over which theirs are taken.
+    heaviest: f64,
     weight: f64,
     requested: f64,
     error: f64,
@@ -432,7 +438,7 @@ impl Sums {
     ) {
         let rows = problem.point(point);
         let limits = &problem.upward;
-        let weight = (limits.weights).map_or(1.0, |all| all[point] / limits.heaviest());
+        let weight = (limits.weights).map_or(1.0, |all| all[point] / self.heaviest);
         let reach = given.at(&rows, lambda);
         let force = rows.given(&given.currents);
         let request = rows.request.map(|part| lambda * part);

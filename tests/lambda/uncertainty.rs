@@ -3,6 +3,7 @@
 
 use fluxform_base::uncertainty::{Cause, Uncertainty};
 use fluxform_lambda::ForceProblem;
+use fluxform_lambda::sampling::quarters;
 use fluxform_lambda::uncertainty::{
     Drawn, Study, Surroundings, Turned, displacements_m, draws, robust_currents, study,
 };
@@ -313,6 +314,7 @@ fn of_places(
         vector,
         fields: &fields,
         pull_n: None,
+        quarters: &quarters(&(0..positions.len()).collect::<Vec<_>>(), None),
     };
     let drawn = Drawn {
         draws: &drawn,

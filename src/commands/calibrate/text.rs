@@ -9,7 +9,9 @@ use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::{LeftOut, Manifest};
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, headed_table};
-use crate::cli::quantity::{bytes, count, error, length_error, number, number_to, percent, share};
+use crate::cli::quantity::{
+    bytes, count, error, length_error, number, number_to, percent, share, share_within,
+};
 use crate::design::Design;
 use crate::digits::with_error;
 use crate::lambda::GivenForce;
@@ -74,12 +76,14 @@ fn force_table(report: &CalibrateReport) -> String {
 fn force_rows(bundle: &BundleReport) -> Vec<Vec<(&'static str, String)>> {
     let file = &bundle.lambda.file;
     let headline = file.headline.as_ref();
-    let felt = headline.and_then(|of| of.felt.as_ref()).map(|of| of.total);
+    let felt = headline.and_then(|of| of.felt.as_ref());
+    let off = felt.and_then(|of| of.sampling).unwrap_or_default();
+    let felt = felt.map(|of| of.total);
     let sideways = file.sideways.as_ref();
     let fixed = ForceRow {
         shape: file.shape.clone(),
         lambda: lambda(file).unwrap_or_else(|| "none".to_owned()),
-        off_by: felt.map(|of| of.fixed),
+        off_by: felt.map(|of| (of.fixed, off.fixed)),
         sideways: sideways.map(|of| of.static_share),
         degrees: sideways.map(|of| of.static_median_deg),
         given: headline.and_then(|of| of.static_currents),
@@ -88,14 +92,14 @@ fn force_rows(bundle: &BundleReport) -> Vec<Vec<(&'static str, String)>> {
     let of_upward = sideways.filter(|_| bundle.manifest.force.is_none());
     let feedback = ForceRow {
         shape: "  with feedback".to_owned(),
-        off_by: felt.map(|of| of.feedback),
+        off_by: felt.map(|of| (of.feedback, off.feedback)),
         sideways: of_upward.map(|of| of.feedback_share),
         given: headline.and_then(|of| of.feedback),
         ..ForceRow::default()
     };
     let robust = felt.and_then(|of| of.robust).map(|robust| ForceRow {
         shape: "  the same, robust".to_owned(),
-        off_by: Some(robust),
+        off_by: Some((robust, off.robust.unwrap_or(0.0))),
         ..ForceRow::default()
     });
     let rows = [Some(fixed), Some(feedback), robust];
@@ -107,7 +111,8 @@ fn force_rows(bundle: &BundleReport) -> Vec<Vec<(&'static str, String)>> {
 struct ForceRow {
     shape: String,
     lambda: String,
-    off_by: Option<f64>,
+    /// With by how much it may be off.
+    off_by: Option<(f64, f64)>,
     sideways: Option<f64>,
     degrees: Option<f64>,
     given: Option<GivenForce>,
@@ -117,10 +122,11 @@ impl ForceRow {
     fn cells(self) -> Vec<(&'static str, String)> {
         let range =
             |of: GivenForce| format!("{} to {}", number_to(of.least * 100.0, 3), percent(of.most));
+        let off_by = self.off_by.map(|(of, off)| share_within(of, off));
         vec![
             ("shape", self.shape),
             ("lambda N/m", self.lambda),
-            ("off by", self.off_by.map(share).unwrap_or_default()),
+            ("off by", off_by.unwrap_or_default()),
             ("sideways", self.sideways.map(percent).unwrap_or_default()),
             (
                 "degrees",

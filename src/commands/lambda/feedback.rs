@@ -3,7 +3,7 @@
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::lambda_file::{
-    FeedbackFile, FeedbackPlace, FeedbackShell, StaticRendering, VectorFeedbackFile,
+    FeedbackFile, FeedbackPlace, FeedbackShell, LargestGiven, StaticRendering, VectorFeedbackFile,
 };
 use crate::lambda::feedback::{
     Decided, FeedbackError, NoLambda, Rendered, Span, dip_between, reachable, render,
@@ -70,7 +70,8 @@ impl PosedProblem<'_> {
         progress: &dyn Progress,
     ) -> Result<WithFeedback, RunError> {
         let mut span = Span::default();
-        span.add(self.problem.height_m, &reachable(&self.problem)?);
+        let reach = reachable(&self.problem)?;
+        span.add(self.problem.height_m, &reach);
         let largest = span.largest();
         let rendered = |lambda| {
             let mut rendered = render(&self.problem, lambda).map_err(render_error)?;
@@ -83,15 +84,9 @@ impl PosedProblem<'_> {
         let at_largest = largest.ok().map(|largest| rendered(largest.lambda_n_per_m));
         let shell = options.shell_m.map(|reach| self.shell(reach, progress));
         let (shell, between_layers) = shell.transpose()?.unzip();
-        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
         let file = FeedbackFile {
-            lambda_n_per_m,
-            reason,
+            largest: largest_given(largest, |at| self.points.positions_m[at.point]),
             smallest_lambda_n_per_m: span.smallest_n_per_m(),
-            decided_at: largest.ok().map(|largest| FeedbackPlace {
-                point: largest.point,
-                position_m: self.points.positions_m[largest.point],
-            }),
             without: chosen.map(|chosen| self.fixed(chosen)),
             at_chosen,
             at_largest: at_largest.transpose()?,
@@ -159,10 +154,10 @@ impl PosedProblem<'_> {
             limits.push(felt.map(of_height).collect());
         }
         let largest = all.largest();
-        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
         let coarse = every_second.largest().ok();
         let coarse = coarse.map(|largest| largest.lambda_n_per_m);
-        let stage = lambda_n_per_m.map(|lambda| {
+        let stage = largest.ok().map(|found| {
+            let lambda = found.lambda_n_per_m;
             let missed = coarse.map_or(0.0, |coarse| coarse - lambda);
             StageAccuracy {
                 estimate: missed.max(dip_between(&limits)) / lambda,
@@ -179,14 +174,9 @@ impl PosedProblem<'_> {
             floor_m: layers.floor_m,
             clipped: layers.clipped(&self.points.height_m),
             places: layers.count() * height_m.len(),
-            lambda_n_per_m,
-            reason,
+            largest: largest_given(largest, |at| layers.places(at.layer, positions_m)[at.point]),
             smallest_lambda_n_per_m: all.smallest_n_per_m(),
             every_second_lambda_n_per_m: coarse,
-            decided_at: largest.ok().map(|largest| FeedbackPlace {
-                point: largest.point,
-                position_m: layers.places(largest.layer, positions_m)[largest.point],
-            }),
         };
         Ok((shell, stage))
     }
@@ -312,16 +302,10 @@ impl PosedProblem<'_> {
         let at_largest = largest
             .ok()
             .map(|l| rendered(l.lambda_n_per_m, CurrentsOf::Vector));
-        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
         Ok(Some(VectorFeedbackFile {
             direction: force.direction,
             normal_force: force.along_normal(),
-            lambda_n_per_m,
-            reason,
-            decided_at: largest.ok().map(|largest| FeedbackPlace {
-                point: largest.point,
-                position_m: positions[largest.point],
-            }),
+            largest: largest_given(largest, |at| positions[at.point]),
             fixed: at_chosen(|chosen| CurrentsOf::Static(&chosen.currents_a))?,
             static_vector: Some(self.static_vector(&problem, chosen)?),
             upward: at_chosen(|_| CurrentsOf::Upward)?,
@@ -382,10 +366,18 @@ impl PosedProblem<'_> {
     }
 }
 
-fn lambda_or_reason(largest: Result<Decided, NoLambda>) -> (Option<f64>, Option<String>) {
-    match largest {
-        Ok(largest) => (Some(largest.lambda_n_per_m), None),
-        Err(why) => (None, Some(why.to_string())),
+fn largest_given(
+    largest: Result<Decided, NoLambda>,
+    position_m: impl Fn(Decided) -> [f64; 3],
+) -> LargestGiven {
+    let found = largest.ok();
+    LargestGiven {
+        lambda_n_per_m: found.map(|found| found.lambda_n_per_m),
+        reason: largest.err().map(|why| why.to_string()),
+        decided_at: found.map(|found| FeedbackPlace {
+            point: found.point,
+            position_m: position_m(found),
+        }),
     }
 }
 

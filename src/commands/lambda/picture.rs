@@ -27,7 +27,10 @@ impl PosedProblem<'_> {
         feedback_n: Vec<f64>,
     ) -> LambdaPlot {
         let path = &solution.path;
-        let feedback = file.feedback.as_ref().and_then(|f| f.lambda_n_per_m);
+        let feedback = file
+            .feedback
+            .as_ref()
+            .and_then(|f| f.largest.lambda_n_per_m);
         let constants: Vec<Constant> = Criterion::ALL
             .iter()
             .map(|&criterion| (criterion.name(), file.constants.of(criterion)))

@@ -198,6 +198,17 @@ impl ForcePoints {
         }
     }
 
+    /// Their places in their grid, if they are those of one.
+    pub(super) fn grid_places(&self) -> Option<limit::GridPlaces<'_>> {
+        self.grid.as_ref().map(|grid| limit::GridPlaces {
+            columns: grid.columns,
+            rows: grid.rows,
+            index: &grid.index,
+            smooth: self.fine.as_ref().map_or(&[], |fine| &fine.smooth),
+            smooth_within: SMOOTH,
+        })
+    }
+
     /// How far the constant of these points is from the limit of ever more of them, relative; `None`
     /// for graded points, whose patches are compared with wider ones instead. `unwired`
     /// is `problem` before `wiring`.
@@ -215,13 +226,7 @@ impl ForcePoints {
             return Ok(None);
         }
         let cells = self.fine.as_ref();
-        let grid = self.grid.as_ref().map(|grid| limit::GridPlaces {
-            columns: grid.columns,
-            rows: grid.rows,
-            index: &grid.index,
-            smooth: cells.map_or(&[], |fine| &fine.smooth),
-            smooth_within: SMOOTH,
-        });
+        let grid = self.grid_places();
         if let (Some(cells), Some(on_grid)) = (cells, self.before_graded()) {
             let (of_grid, graded) = problem.split_at(on_grid);
             let fine = Some(fine_samples(cells, &graded, true));

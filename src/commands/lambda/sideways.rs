@@ -9,6 +9,7 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::force_direction::RequestedForce;
 use crate::lambda::ForceProblem;
 use crate::lambda::feedback::FeedbackError;
+use crate::lambda::sampling::{QUARTERS, Squares, share_and_error};
 use crate::lambda::sideways::{Sideways, sideways};
 use crate::lambda::vector_feedback::{CurrentsOf, VectorProblem, render_vectors_at};
 use crate::numerics::spread::spread;
@@ -22,9 +23,11 @@ use super::LambdaOptions;
 use super::points::ForcePoints;
 use super::uncertain::{self, Chosen};
 
-/// Points looked at, at most: means and medians of a force that changes over centimetres.
-const MOST_POINTS: usize = 4000;
-/// Of them those at which currents follow the position, at most,
+/// Forces per ampere along each axis at the points looked at, at most: their memory and time.
+const NUMBERS: usize = 400_000;
+/// Points looked at in any case.
+const LEAST_POINTS: usize = 1000;
+/// Of them those at which currents give all three components, at most,
 const MOST_FOLLOWED: usize = 1000;
 /// and those at which the steel's sideways pull is computed, half a millisecond each.
 const MOST_PULLED: usize = 100;
@@ -46,7 +49,7 @@ pub(crate) fn add(
     let (Some(currents_a), Some(lambda)) = (&file.currents_a, file.lambda_n_per_m) else {
         return Ok(());
     };
-    let chosen = Chosen::new(points, MOST_POINTS);
+    let chosen = Chosen::new(points, (NUMBERS / scene.coils.len()).max(LEAST_POINTS));
     let positions_m = &chosen.positions_m;
     let pull = passive::counted(scene, positions_m)?;
     let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(positions_m));
@@ -86,18 +89,19 @@ pub(crate) fn add(
     };
     let all: Vec<usize> = (0..positions_m.len()).collect();
     let some = spread(all.len(), MOST_FOLLOWED);
-    let felt = |of, points| -> Result<f64, FeedbackError> {
-        Ok(render_vectors_at(&vectors, points, lambda, of)?.error_share)
-    };
+    let quarters = chosen.quarters(points);
+    let felt = |of| felt_share(&vectors, &quarters, lambda, of);
     let found = sideways(&of_z, sides, lambda, currents_a, &some).and_then(|sideways| {
-        let exact = FeltShares {
-            fixed: felt(CurrentsOf::Static(currents_a), &all)?,
-            feedback: felt(followed, &some)?,
+        let (fixed, fixed_off) = felt(CurrentsOf::Static(currents_a))?;
+        let (feedback, feedback_off) = felt(followed)?;
+        let of = |fixed, feedback| FeltShares {
+            fixed,
+            feedback,
             robust: None,
         };
-        Ok((sideways, exact))
+        Ok((sideways, of(fixed, feedback), of(fixed_off, feedback_off)))
     });
-    let (sideways, exact) = found.map_err(|error| match error {
+    let (sideways, exact, sampling) = found.map_err(|error| match error {
         FeedbackError::Problem(problem) => RunError::from(problem),
         FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),
     })?;
@@ -108,9 +112,36 @@ pub(crate) fn add(
     });
     if let Some(headline) = &mut file.headline {
         let study = file.uncertainty.as_ref();
-        headline.add_felt(FeltForce::new(exact, study, pull_share));
+        headline.add_felt(FeltForce::new((exact, sampling), study, pull_share));
     }
     Ok(())
+}
+
+/// The error of the vector relative to the requested one, and by how much that may be off, being that of some points.
+fn felt_share(
+    problem: &VectorProblem,
+    quarters: &[usize],
+    lambda_n_per_m: f64,
+    of: CurrentsOf,
+) -> Result<(f64, f64), FeedbackError> {
+    let mut sums = [Squares::default(); QUARTERS];
+    for (quarter, sums) in sums.iter_mut().enumerate() {
+        let mine = |point: &usize| quarters[*point] == quarter;
+        let points: Vec<usize> = (0..quarters.len()).filter(mine).collect();
+        if points.is_empty() {
+            continue;
+        }
+        let rendered = render_vectors_at(problem, &points, lambda_n_per_m, of)?;
+        let square = |point: &usize| {
+            let limits = &problem.upward;
+            let request = problem.direction[*point].map(|part| part * limits.height_m[*point]);
+            limits.weights.map_or(1.0, |all| all[*point])
+                * request.iter().map(|part| part * part).sum::<f64>()
+        };
+        sums.requested = points.iter().map(square).sum();
+        sums.error = sums.requested * rendered.error_share.powi(2);
+    }
+    Ok(share_and_error(&sums))
 }
 
 /// The steel's sideways pull, root mean square over that of the requested force, to about a tenth of itself: of some

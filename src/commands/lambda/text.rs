@@ -3,9 +3,9 @@
 use super::LambdaReport;
 use crate::bundle::headline::FeltForce;
 use crate::bundle::lambda_file::{
-    AtLambda, FeedbackFile, FeedbackPlace, FeedbackShell, LambdaFile, LambdaVariant,
-    TolerancePoint, TwoFingers, VectorCurrents, VectorFeedbackFile, VectorStatic,
-    WorkingPointForces, WorstPointFile,
+    AtLambda, FeedbackFile, FeedbackShell, LambdaFile, LambdaVariant, LargestGiven, TolerancePoint,
+    TwoFingers, VectorCurrents, VectorFeedbackFile, VectorStatic, WorkingPointForces,
+    WorstPointFile,
 };
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, headed_table};
@@ -56,7 +56,7 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
         sheet.line("uncertain", &describe::uncertainty(of));
     }
     if let Some(with_feedback) = &file.feedback {
-        feedback_lines(&mut sheet, design, with_feedback);
+        feedback_lines(&mut sheet, design, with_feedback, file.points);
     }
     if let Some(currents) = &file.currents_a {
         sheet.line("currents", &describe::currents(design, currents));
@@ -125,8 +125,9 @@ fn at_lines(sheet: &mut Sheet, design: &Design, at: &AtLambda) {
 }
 
 /// The result with currents of their own at every point, beside the static ones.
-fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
-    let constant = largest(file.lambda_n_per_m, file.reason.as_deref(), file.decided_at);
+fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile, points: usize) {
+    let points = &format!("all {}", count(points, "point"));
+    let constant = largest(&file.largest, points);
     let mut lines = vec![format!("lambda {constant}")];
     lines.extend(file.at_chosen.iter().map(rendering));
     lines.extend(file.without.iter().map(|fixed| {
@@ -150,7 +151,7 @@ fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
         sheet.line("active", &describe::per_coil(design, &unit, &shares, 1));
     }
     if let Some(vector) = &file.vector {
-        vector_lines(sheet, vector, file.at_chosen.as_ref());
+        vector_lines(sheet, vector, points, file.at_chosen.as_ref());
     }
     if let Some(of) = &file.two_fingers {
         sheet.line("two fingers", &two_fingers(of));
@@ -161,8 +162,13 @@ fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
 }
 
 /// The requested vector with feedback, and what other currents make of it.
-fn vector_lines(sheet: &mut Sheet, file: &VectorFeedbackFile, at_chosen: Option<&Rendered>) {
-    let constant = largest(file.lambda_n_per_m, file.reason.as_deref(), file.decided_at);
+fn vector_lines(
+    sheet: &mut Sheet,
+    file: &VectorFeedbackFile,
+    points: &str,
+    at_chosen: Option<&Rendered>,
+) {
+    let constant = largest(&file.largest, points);
     let size = file.normal_force.map_or_else(String::new, |size| {
         format!(", lambda times the height its {} part", size.name())
     });
@@ -252,18 +258,18 @@ fn static_vector(file: &VectorStatic) -> Vec<String> {
     std::iter::once(first).chain(points.map(one)).collect()
 }
 
-fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlace>) -> String {
-    match (lambda, place) {
-        (Some(lambda), Some(place)) => {
-            let [x, y, z] = place.position_m.map(|v| number(v * 1e3));
-            format!(
-                "up to {} N/m at every place; point {} decides, at x {x}, y {y}, z {z} mm",
-                number(lambda),
-                place.point
-            )
-        }
-        _ => format!("none: {}", reason.unwrap_or("no force is requested")),
-    }
+/// The largest constant of all `places`: others between them are not looked at.
+fn largest(given: &LargestGiven, places: &str) -> String {
+    let (Some(lambda), Some(place)) = (given.lambda_n_per_m, given.decided_at) else {
+        let reason = given.reason.as_deref();
+        return format!("none: {}", reason.unwrap_or("no force is requested"));
+    };
+    let [x, y, z] = place.position_m.map(|v| number(v * 1e3));
+    format!(
+        "up to {} N/m at {places}; point {} decides, at x {x}, y {y}, z {z} mm",
+        number(lambda),
+        place.point
+    )
 }
 
 fn rendering(rendered: &Rendered) -> String {
@@ -302,9 +308,8 @@ fn shell_of(shell: &FeedbackShell) -> String {
         mm(shell.reach_m),
         count(shell.layers, "layer"),
         largest(
-            shell.lambda_n_per_m,
-            shell.reason.as_deref(),
-            shell.decided_at
+            &shell.largest,
+            &format!("all {}", count(shell.places, "place"))
         )
     )
 }

@@ -4,6 +4,7 @@ use crate::RunError;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
+use crate::lambda::sampling::quarters;
 use crate::lambda::uncertainty::{
     Draw, Drawn, StudyError, Surroundings, Turned, displacements_m, draws, most_points, study,
 };
@@ -91,6 +92,7 @@ pub(crate) fn add(
         vector: force.direction.is_vector(),
         fields: &fields,
         pull_n: pull_n.as_deref(),
+        quarters: &chosen.quarters(points),
     };
     let drawn = Drawn {
         draws: &draws,
@@ -134,6 +136,11 @@ impl Chosen {
             weights: points.weights().map(of),
             rows,
         }
+    }
+
+    /// The quarter of each.
+    pub(super) fn quarters(&self, points: &ForcePoints) -> Vec<usize> {
+        quarters(&self.rows, points.grid_places())
     }
 
     pub(super) fn directions(&self, points: &ForcePoints, force: RequestedForce) -> Vec<[f64; 3]> {

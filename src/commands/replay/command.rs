@@ -109,11 +109,13 @@ pub struct Replay {
     writing: Writing,
 }
 
-/// A number above 0.
+/// A number above 0, as far as positions can be counted.
 fn positive(text: &str) -> Result<f64, String> {
-    match values::force_constant(text) {
-        Ok(value) if value > 0.0 => Ok(value),
-        _ => Err(format!("{text:?}: expected a number above 0, like 50")),
+    match text.trim().parse() {
+        Ok(value) if value > 0.0 && value <= MOST_POSITIONS => Ok(value),
+        _ => Err(format!(
+            "{text:?}: expected a number above 0, up to {MOST_POSITIONS:e}, like 50"
+        )),
     }
 }
 

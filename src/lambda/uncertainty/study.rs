@@ -12,6 +12,7 @@ use fluxform_base::uncertainty::{Cause, Uncertainty};
 use super::{Draw, ErrorForm, Forms, ON_AXES, ON_DIAGONALS, RULE, Reach, Turned, displacements_m};
 use crate::allocation::{Allocator, AllocatorError};
 use crate::problem::{ForceProblem, ProblemError, Settings};
+use crate::sampling::{QUARTERS, Squares, share_and_error};
 use crate::sideways::SIDEWAYS_WEIGHT;
 use crate::vector_allocation::VectorAllocator;
 
@@ -53,6 +54,8 @@ pub struct Surroundings<'a> {
     pub fields: &'a [Turned],
     /// Upward force without currents, N, [point, displacement].
     pub pull_n: Option<&'a [f64]>,
+    /// The quarter of every point ([`crate::sampling::quarters`]).
+    pub quarters: &'a [usize],
 }
 
 /// Errors of the felt force: root mean squares of its difference from the requested one over the points and
@@ -161,6 +164,10 @@ pub struct Study {
     pub robust: RobustSetting,
     /// The expected errors of the same currents if nothing were uncertain.
     pub exact: Shares,
+    /// By how much the expected errors may be off, being those of so many points; absent in files of programs without
+    /// it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Shares>,
     /// The error that each uncertainty causes, the one first whose halving gains most.
     pub causes: Vec<CauseCost>,
 }
@@ -309,6 +316,19 @@ impl<'a> Bench<'a> {
             power += weight * self.power_w(own);
         }
         self.shares(upward, sideways, power)
+    }
+
+    /// By how much the expected error may be off, being that of some points.
+    fn sampling(&self, forms: &[Forms], currents: &Currents) -> f64 {
+        let mut quarters = [Squares::default(); QUARTERS];
+        for (point, forms) in forms.iter().enumerate() {
+            let (weight, own) = (self.around.weight(point), currents.at(point));
+            let quarter = &mut quarters[self.around.quarters[point]];
+            quarter.error += weight * (forms.upward.value(own) + forms.sideways.value(own));
+            let request = self.around.request_n(point, self.lambda);
+            quarter.requested += weight * request.iter().map(|part| part * part).sum::<f64>();
+        }
+        share_and_error(&quarters).1
     }
 
     /// Of the random displays, whose forces per ampere and pulls are given.
@@ -613,6 +633,11 @@ pub fn study(
         points: around.problem.points(),
         draws: drawn.draws.len(),
         power_cap_w,
+        sampling: Some(Shares {
+            fixed: bench.sampling(&forms, &fixed),
+            feedback: bench.sampling(&forms, &feedback),
+            robust: bench.sampling(&forms, &robust_currents),
+        }),
         fixed: bench.error(&forms, drawn, given, &fixed),
         feedback: bench.error(&forms, drawn, given, &feedback),
         robust_static,

@@ -158,6 +158,7 @@ fn felt(body: &mut Html, object: &CalibratedObject) {
         .map(|part| row(part.cause.words(), part.error))
         .collect();
     rows.push(row("together", felt.total));
+    rows.extend((felt.sampling).map(|of| row("known to within, from some points", of)));
     body.table(&Table {
         caption:
             "Felt error of the force vector, from file to finger, relative to the requested force"
