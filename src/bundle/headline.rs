@@ -44,6 +44,9 @@ pub enum BudgetName {
     /// interpolation of the map
     #[strum(serialize = "interpolation of the map")]
     Interpolation,
+    /// saturation of the steel
+    #[strum(serialize = "saturation of the steel")]
+    Saturation,
     /// pull of the unpowered steel
     #[strum(serialize = "pull of the unpowered steel")]
     Pull,
@@ -66,7 +69,7 @@ impl BudgetName {
     #[must_use]
     pub fn is_of_lambda(self) -> bool {
         match self {
-            Self::Points | Self::Heights | Self::Forces | Self::Solution => true,
+            Self::Points | Self::Heights | Self::Forces | Self::Saturation | Self::Solution => true,
             Self::BetweenPoints
             | Self::MapNodes
             | Self::Interpolation
@@ -85,6 +88,9 @@ impl BudgetName {
             }
             Self::Forces | Self::MapNodes => "halve --tolerance",
             Self::Interpolation => "take 1.2 times as many nodes along each axis of [workspace]",
+            Self::Saturation => {
+                "set supply.current_max_a near the currents used, or lower them below the steel's knee"
+            }
             Self::Pull | Self::PullMap => {
                 "the pull's own tolerance is fixed; its share falls with a larger lambda"
             }

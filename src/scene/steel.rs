@@ -66,9 +66,12 @@ pub struct Solved {
     /// The error that is claimed of the steel's solution, relative to the same; 0 without steel.
     pub steel_error: f64,
     /// Permeability of the linear solution. With a B-H curve the cores of coils that are not
-    /// coupled follow the curve at the rated current; those that are coupled are linear, of the
-    /// permeability at the mean |B| of one coil alone at the rated current.
+    /// coupled follow the curve at the rated current, or at the supply's where that is less; those that are coupled are
+    /// linear, of the permeability at the mean |B| of one coil alone at that current.
     pub relative_permeability: f64,
+    /// The largest |B| in a core at that current, T, where it is above the steel's knee.
+    #[serde(default)]
+    above_knee_t: Option<f64>,
     /// The field as it was last prepared.
     #[serde(skip)]
     prepared: PreparedField,
@@ -83,8 +86,22 @@ impl Solved {
             tolerance,
             steel_error: 0.0,
             relative_permeability: 1.0,
+            above_knee_t: None,
             prepared: PreparedField::default(),
         }
+    }
+
+    /// A sentence on forces per ampere that hold at the currents of saturated cores alone.
+    #[must_use]
+    pub fn above_knee(&self, scene: &Scene) -> Option<String> {
+        let (peak_t, core) = self.above_knee_t.zip(scene.core.as_ref())?;
+        Some(format!(
+            "the core at {} A reaches {peak_t:.2} T, above the steel's knee at {:.2} T: forces per ampere are those \
+             at that current; smaller currents give more, and forces of several do not add up: set \
+             supply.current_max_a near the currents used",
+            most_current_a(scene),
+            core.knee_t
+        ))
     }
 
     /// The steel as a source.
@@ -339,11 +356,14 @@ pub(super) fn solve_with(
     };
     let at_current = state_at_current(scene, core, tolerance, lowest_m)?;
     let relative_permeability = permeability(core, at_current.as_ref());
+    let peak_t = at_current.as_ref().map(|state| state.inside.peak_b_t);
+    let above_knee_t = peak_t.filter(|peak_t| *peak_t > core.knee_t);
     let solved = |steel, steel_error| Solved {
         steel,
         tolerance,
         steel_error,
         relative_permeability,
+        above_knee_t,
         prepared: PreparedField::default(),
     };
     if coupled(scene.design) {
@@ -382,7 +402,15 @@ pub(super) fn solve_with(
     Ok(solved(Steel::Alone(Box::new(alone)), steel_error))
 }
 
-/// The state of one core along its B-H curve at the rated current; `None` where it has none.
+/// The largest current that a coil can have, A: the rated one, or the supply's.
+fn most_current_a(scene: &Scene) -> f64 {
+    let total_a = scene.design.supply.total_current_max_a;
+    scene
+        .rated_current_a()
+        .min(total_a.unwrap_or(f64::INFINITY))
+}
+
+/// The state of one core along its B-H curve at the largest current that a coil can have; `None` where it has none.
 ///
 /// # Errors
 /// A curve along which no state is found.
@@ -392,7 +420,7 @@ fn state_at_current(
     tolerance: f64,
     lowest_m: f64,
 ) -> Result<Option<SaturatedCoil>, RunError> {
-    let current_a = scene.rated_current_a();
+    let current_a = most_current_a(scene);
     match &core.material {
         Material::Curve(curve) if current_a > 0.0 => {
             let aim = STEEL_SHARE * tolerance;
@@ -473,6 +501,7 @@ fn solve_iron(
         steel_error: array.relative_error,
         steel: Steel::Iron(Box::new(array)),
         relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
+        above_knee_t: None,
         prepared: PreparedField::default(),
     })
 }

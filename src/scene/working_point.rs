@@ -339,8 +339,8 @@ pub(crate) fn superposition_ends(
         format!(
             "superposition ends along the B-H curve: at the working point's currents the state \
              differs by up to {:.1} % of the largest from the sum of {what} (the cores reach \
-             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower the currents until \
-             working_point.deviation_from_linear is small enough",
+             {peak_t:.2} T, the knee is at {knee_t:.2} T); set supply.current_max_a near the \
+             currents used, for which the cores are solved, or stay below the knee",
             100.0 * deviation_from_linear
         )
     })

@@ -428,3 +428,62 @@ fn regression_a_plate_within_its_grid_had_no_pull_of_the_steel() {
     let found = place.run(&args).ends(0).json();
     assert!(found["lambda_n_per_m"].as_f64().unwrap() > 0.0);
 }
+
+/// One coil with steel of a table, whose supply is `supply`.
+fn saturated(place: &Place, array: &str, supply: &str) {
+    place.write(
+        "saturated.toml",
+        &format!(
+            "name = \"t\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 100\nturns = 1429\n\
+             [wire]\ndiameter_mm = 0.7\n[core]\nbh_curve = \"designs/steel_1010.csv\"\n{array}\
+             [magnet]\ndiameter_mm = 10\nlength_mm = 10\nmagnetization_a_per_m = 1.1579e6\n[supply]\n{supply}\n"
+        ),
+    );
+}
+
+/// Regression: above the knee forces per ampere are those at the limit alone, half of those at small currents; nothing
+/// said so, and with a limit of the sum they were of a current that no coil can have.
+#[test]
+fn forces_of_a_saturated_core_hold_at_its_limit_alone() {
+    let place = Place::new();
+    place.write(
+        "flat.toml",
+        "name = \"flat\"\nprimitive = \"flat\"\nheight_mm = 30\nside_mm = 40\n[points]\n\
+         x_mm = [-20.0, 20.0, 9]\ny_mm = [-20.0, 20.0, 9]\n",
+    );
+    let lambda = |flags: &[&str]| {
+        let args = [&["lambda", "saturated.toml", "flat.toml"], flags].concat();
+        place.run(&args).ends(0)
+    };
+    let number = |of: &serde_json::Value, path: &str| {
+        of.pointer(path)
+            .and_then(serde_json::Value::as_f64)
+            .unwrap_or_else(|| panic!("{path}"))
+    };
+    let json = ["--format", "json"];
+    saturated(&place, "", "current_max_a = 20");
+    lambda(&["--at", "1"]).says(&[
+        "above the steel's knee at 1.44 T",
+        "--at: superposition ends",
+    ]);
+    place.write("at.csv", "x_m,y_m,z_m\n0,0,0.03\n");
+    let probed = place.run(&["probe", "saturated.toml", "at.csv", "--out", "gz.csv"]);
+    probed.ends(0).says(&["above the steel's knee"]);
+    saturated(&place, "", "current_max_a = 20\ntotal_current_max_a = 2");
+    let capped = lambda(&json).json();
+    saturated(&place, "", "current_max_a = 2");
+    let limited = lambda(&json).json();
+    let [capped, limited] = [capped, limited].map(|of| number(&of, "/lambda_n_per_m"));
+    assert!((capped / limited - 1.0).abs() < 1e-9, "{capped} {limited}");
+    // Two coils share 8 A: neither has them, and the rest is an error of lambda.
+    let two = "[array]\npositions_mm = [[-30.0, 0.0], [30.0, 0.0]]\ncoupling = \"none\"\n";
+    saturated(&place, two, "current_max_a = 20\ntotal_current_max_a = 8");
+    let shared = lambda(&json).json();
+    let off = number(&shared, "/working_point/deviation_from_linear");
+    let stated = number(&shared, "/headline/lambda_error_n_per_m");
+    assert!(off > 0.03, "{off}");
+    assert!(
+        stated >= off * number(&shared, "/lambda_n_per_m"),
+        "{stated} {off}"
+    );
+}

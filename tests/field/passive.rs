@@ -344,3 +344,28 @@ fn the_coupling_of_nine_cores_is_no_small_correction() {
     let ratio = coupled.force_n(at)[2] / alone.force_n(at)[2];
     assert!((ratio - 0.8495).abs() < 2e-3, "{ratio}");
 }
+
+/// Regression: the magnet's dipoles magnetise the core and feel it, but their rule's error counted once, as in a field.
+#[test]
+fn far_away_the_error_of_the_magnets_rule_is_that_of_both_its_parts() {
+    for (size_m, z_m) in [(0.01, 0.2), (0.01, 0.3), (0.003, 0.06)] {
+        let size = Some(Cylinder {
+            diameter_m: size_m,
+            length_m: size_m,
+        });
+        let pulled = Pulled {
+            size,
+            ..one([z_m, 1.1 * z_m])
+        };
+        let at = |tolerance| {
+            let pull = PassivePull::new(&pulled, tolerance).unwrap();
+            (pull.force_n([0.0, 0.0, z_m])[2], pull.relative_error)
+        };
+        let [(loose, stated), (fine, finer)] = [at(1e-3), at(1e-5)];
+        let miss = (loose / fine - 1.0).abs();
+        assert!(
+            miss < stated + finer && finer < 0.1 * stated,
+            "{size_m} {z_m}: {miss:e} {stated:e} {finer:e}"
+        );
+    }
+}

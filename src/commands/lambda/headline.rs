@@ -70,6 +70,13 @@ impl PosedProblem<'_> {
         .into_iter()
         .flatten()
         .collect();
+        budget.extend(file.working_point.as_ref().map(|point| BudgetPart {
+            part: BudgetName::Saturation,
+            error: point.deviation_from_linear,
+            how: "largest difference of the forces along the B-H curve at the chosen currents from those that \
+                  lambda was solved with, relative to the largest"
+                .to_owned(),
+        }));
         let forces = stage("forces").map_or(0.0, |stage| stage.estimate);
         budget.push(amplification.part(BudgetName::Forces, forces));
         if let (Some(pull), Some(offset_n)) = (stage("passive_force"), self.unwired.offset_n) {

@@ -579,6 +579,11 @@ impl PosedProblem<'_> {
             file.working_point = Some(along_curve.forces);
             warnings.extend(along_curve.warning);
         }
+        if let Some(at) = &solution.at {
+            let along_curve = self.along_curve(at, progress)?;
+            let warning = along_curve.and_then(|along_curve| along_curve.warning);
+            warnings.extend(warning.map(|warning| format!("--at: {warning}")));
+        }
         file.accuracy.extend(self.points.stages());
         let effects = [
             ("lambda_of_points", self.effect_of_number(&file, progress)?),
@@ -614,6 +619,7 @@ impl PosedProblem<'_> {
             return Ok(Vec::new());
         };
         let mut warnings = core.warnings.clone();
+        warnings.extend(self.solved.above_knee(self.scene));
         if let (Some(chosen), Material::Linear(_)) = (&solution.chosen, &core.material) {
             let (peak_t, error) = self.core_peak_t(core, &chosen.currents_a)?;
             warnings.extend(above_knee(

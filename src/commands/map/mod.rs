@@ -377,6 +377,7 @@ impl Made {
     ) -> MapReport {
         let core = scene.core.as_ref();
         let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
+        warnings.extend(self.solved.above_knee(scene));
         warnings.extend(scene.iron.iter().flat_map(|iron| iron.put_right.clone()));
         warnings.extend(self.together.and_then(|together| together.warning));
         let requested = request

@@ -161,6 +161,9 @@ impl Probe {
         };
         let table = probe(design, points_m, request, &bar)?;
         drop(bar);
+        for warning in &table.warnings {
+            printer.warning(warning);
+        }
         let mut summary = ProbeSummary {
             schema_version: SCHEMA_VERSION,
             fluxform_version: FLUXFORM_VERSION,

@@ -49,6 +49,8 @@ pub struct ProbeTable {
     pub force_method: String,
     /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
 }
 
 /// The options of [`probe`].
@@ -158,6 +160,7 @@ pub fn probe(
         iron_difference,
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
+        warnings: solved.above_knee(&scene).into_iter().collect(),
         accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
     })
 }

@@ -130,7 +130,7 @@ impl IronPull {
         tolerance: f64,
     ) -> Option<Self> {
         let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
-        let bound = magnet.magnet_rule(lowest_m).bound();
+        let bound = magnet.rule_error(lowest_m);
         let [first, last] = tiers(iron, tolerance);
         let mut pull = Self::at_resolution(iron, magnet, first)?;
         let coarsest = pull.forces_n(places_m);

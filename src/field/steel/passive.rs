@@ -264,7 +264,7 @@ impl PassivePull {
         } else {
             Added::nothing(places_m.len())
         };
-        let rule_error = magnet.magnet_rule(region.z_m[0]).bound();
+        let rule_error = magnet.rule_error(region.z_m[0]);
         for (k, at) in places_m.iter().enumerate() {
             let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + added.force_n[k][i]);
             let size = norm(total);

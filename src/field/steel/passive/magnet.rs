@@ -8,6 +8,10 @@ use crate::magnet::{Cylinder, MagnetRule, Sources};
 const FAR_REACHES: f64 = 2.0;
 /// Rules of up to so many nodes are used at every height: a change of rule is a small jump.
 const ONE_RULE: usize = 32;
+/// The pull's error over the bound of a rule's. The magnet's dipoles magnetise the steel and feel it: far from small steel,
+/// where the pull falls with the seventh power of the distance, both together are off by so many times what one is in
+/// the field of a charge, of which the bound is.
+const BOTH: f64 = 8.0 / 3.0;
 /// Part of the tolerance allowed to rules that change with the height.
 const JUMPS: f64 = 0.3;
 
@@ -43,7 +47,7 @@ impl PassiveMagnet {
             size,
             top_m,
             lowest_m,
-            tolerance,
+            tolerance: tolerance / BOTH,
             fixed_m: lowest_m,
         };
         if size.is_none() && lowest_m <= top_m {
@@ -83,6 +87,12 @@ impl PassiveMagnet {
         // Rounding of a table's lowest node must not fail where the promised height did not.
         self.try_rule(z_m.clamp(self.lowest_m, self.fixed_m))
             .unwrap_or_else(|_| MagnetRule::dipole(self.moment_a_m2))
+    }
+
+    /// Bound of what that rule adds to the error of the pull, relative.
+    #[must_use]
+    pub fn rule_error(&self, z_m: f64) -> f64 {
+        BOTH * self.magnet_rule(z_m).bound()
     }
 
     /// The dipoles of [`PassiveMagnet::magnet_rule`] about the centre.
