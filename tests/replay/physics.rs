@@ -317,3 +317,51 @@ fn older_bundles_replay_but_know_no_lag() {
         "{words}"
     );
 }
+
+/// Regression: errors, currents and heat were those at the ends of the times that positions are held, 0.8 mN for 141 mN
+/// at worst, and root mean squares weighed rows, also those held for no time.
+#[test]
+fn the_summary_is_of_all_the_time_however_it_is_cut_into_rows() {
+    let opened = coupled().open("flat");
+    let places = [[-9.0, 4.0, 45.0], [11.0, -7.0, 52.0], [-3.0, 13.0, 48.0]];
+    let held_in_rows = |rows: usize, step_s: f64| {
+        let mut trajectory = Trajectory::default();
+        for k in 0..4 * rows {
+            trajectory.t_s.push(step_s * k as f64);
+            let place = places[k / rows % places.len()];
+            trajectory.position_m.push(place.map(|mm| 1e-3 * mm));
+        }
+        trajectory
+    };
+    let [few, many] = [held_in_rows(1, 0.2), held_in_rows(40, 0.005)]
+        .map(|trajectory| replayed(&opened, &trajectory, true).summary);
+    let of = |summary: &fluxform::commands::replay::summary::ReplaySummary| {
+        let feedback = &summary.force.feedback;
+        [
+            feedback.rms_error_n,
+            summary.power.mean_w,
+            feedback.worst_error_n,
+            summary.power.max_w,
+            summary.currents.max_a[0],
+        ]
+    };
+    for (few, many) in of(&few).iter().zip(of(&many)) {
+        assert!((few / many - 1.0).abs() < 0.02, "{few} {many}");
+    }
+    assert!(few.force.feedback.worst_error_n > 0.01);
+    // Rows that last no time change no mean.
+    let mut trajectory = held_in_rows(1, 0.2);
+    let once = replayed(&opened, &trajectory, false).summary.force;
+    for _ in 0..3 {
+        trajectory.t_s.insert(1, trajectory.t_s[1]);
+        trajectory.position_m.insert(1, [0.019, 0.019, 0.03]);
+    }
+    let passed = replayed(&opened, &trajectory, false).summary.force;
+    for (once, passed) in [
+        (&once.feedback, &passed.feedback),
+        (&once.fixed, &passed.fixed),
+    ] {
+        let apart = (once.rms_error_n - passed.rms_error_n).abs();
+        assert!(apart < 1e-12, "{once:?} {passed:?}");
+    }
+}

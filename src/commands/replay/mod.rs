@@ -2,10 +2,11 @@
 //!
 //! A position is held until the next one is measured. Its row states the end of that time: with
 //! `dynamics` the currents are then as far as their circuit has let them come, without it they are
-//! the commanded ones.
+//! the commanded ones. The summary is of all that time.
 
 pub(crate) mod command;
 mod felt;
+mod follow;
 pub mod output;
 pub(crate) mod page;
 mod plausible;
@@ -19,18 +20,18 @@ use std::path::{Path, PathBuf};
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::load::Bundle;
-use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
+use crate::bundle::replay::ReplayRows;
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::commands::calibrate::DESIGN_FILE;
 use crate::design::{Design, Driver, Need};
 use crate::lambda::two_fingers::FingerMagnet;
-use crate::numerics::vec3::dot;
 use crate::progress::Progress;
 use crate::scene::finger_magnet;
 use felt::Felt;
+use follow::{Follower, Steps};
 use page::Below;
-use renderer::{Renderer, RendererError, Step};
+use renderer::{Renderer, RendererError};
 use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
 use synthesize::Synthesis;
 
@@ -269,156 +270,25 @@ pub fn run(
         felt: opened.felt(trajectory.len()),
         pushed_n: 0.0,
     };
-    let rows = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
+    let followed = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
     let pushed_n = follower.pushed_n;
     let felt = follower.felt.as_ref().and_then(Felt::summary);
-    let mut summary =
-        ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
+    let mut summary = ReplaySummary::new(
+        opened,
+        source,
+        &followed,
+        dynamics,
+        &follower.bounds,
+        warnings,
+    );
     summary.force.felt = felt;
     if let Some(two) = &mut summary.two_fingers {
         two.magnets_force_n = pushed_n;
     }
     Ok(ReplayReport {
-        rows,
+        rows: followed.rows,
         summary,
         step_s,
         seconds,
     })
-}
-
-/// A step of one finger or two.
-struct Steps {
-    first: Step,
-    second: Option<Step>,
-    /// Force of one magnet on the other, N.
-    pushed_n: f64,
-}
-
-impl Steps {
-    /// That of a row, its currents written to `currents_a`.
-    fn take(
-        renderer: &mut Renderer,
-        trajectory: &Trajectory,
-        row: usize,
-        currents_a: &mut [f64],
-    ) -> Self {
-        let position_m = trajectory.position_m[row];
-        let Some(second_m) = trajectory.second_m.get(row) else {
-            let first = renderer.step(position_m, currents_a);
-            return Self {
-                first,
-                second: None,
-                pushed_n: 0.0,
-            };
-        };
-        let (steps, push_n) = renderer.pair_step([position_m, *second_m], currents_a);
-        let [first, second] = steps;
-        Self {
-            first,
-            second: Some(second),
-            pushed_n: dot(push_n, push_n).sqrt(),
-        }
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Step> {
-        std::iter::once(&self.first).chain(&self.second)
-    }
-
-    /// The force on each finger with these currents, N, right after its step.
-    fn given_n(&self, renderer: &Renderer, currents_a: &[f64]) -> [[f64; 3]; 2] {
-        match self.second {
-            None => [renderer.given_n(&self.first, currents_a), [0.0; 3]],
-            Some(second) => renderer.pair_given_n(&[self.first, second], currents_a),
-        }
-    }
-}
-
-/// Goes through the positions again for the numbers that a runtime has no time for.
-struct Follower {
-    renderer: Renderer,
-    /// The bundle's static currents.
-    fixed_a: Vec<f64>,
-    bounds: summary::Bounds,
-    /// That of the current loop, Hz, where the drivers close one.
-    bandwidth_hz: Option<f64>,
-    /// Where currents are chosen for uncertainties.
-    felt: Option<Felt>,
-    /// The largest force of one finger's magnet on the other's, N.
-    pushed_n: f64,
-}
-
-impl Follower {
-    fn rows(
-        &mut self,
-        trajectory: &Trajectory,
-        steps: &[Steps],
-        commanded_a: Vec<f64>,
-        mut drive: Option<&mut Drive>,
-        progress: &dyn Progress,
-    ) -> Result<ReplayRows, RunError> {
-        let coils = self.renderer.coils();
-        let held_s = trajectory.held_s();
-        let mut rows = ReplayRows {
-            coils,
-            t_s: trajectory.t_s.clone(),
-            second: (!trajectory.second_m.is_empty()).then(FingerRows::default),
-            ..ReplayRows::default()
-        };
-        let mut flowing = vec![0.0; coils];
-        let mut again = vec![0.0; coils];
-        for (row, steps) in steps.iter().enumerate() {
-            if row % PORTION == 0 {
-                progress.check()?;
-            }
-            let command = &commanded_a[row * coils..(row + 1) * coils];
-            Steps::take(&mut self.renderer, trajectory, row, &mut again);
-            flowing.copy_from_slice(command);
-            if let Some(drive) = &mut drive {
-                if row == 0 {
-                    drive.settle(command);
-                }
-                match self.bandwidth_hz {
-                    None => drive.hold(command, held_s[row]),
-                    Some(bandwidth_hz) => drive.track(command, held_s[row], bandwidth_hz),
-                }
-                drive.currents(&mut flowing);
-            }
-            let given_n = steps.given_n(&self.renderer, &flowing);
-            let static_n = steps.given_n(&self.renderer, &self.fixed_a);
-            let fingers = std::iter::once(&mut rows.first).chain(&mut rows.second);
-            let all = fingers.zip(steps.iter()).zip(trajectory.fingers());
-            for (finger, ((rows, step), positions_m)) in all.enumerate() {
-                let [x, y, z] = given_n[finger];
-                rows.position_m.push(positions_m[row]);
-                rows.height_m.push(step.height_m);
-                rows.wanted_force_n.push(step.wanted_n);
-                rows.force_n.push(z);
-                if let Some(sideways) = step.sideways {
-                    rows.wanted_sideways_n.push(sideways.wanted_n);
-                    rows.sideways_n.push([x, y]);
-                }
-                rows.static_force_n.push(static_n[finger][2]);
-                rows.answer.push(step.answer);
-            }
-            rows.current_a.extend(&flowing);
-            self.pushed_n = self.pushed_n.max(steps.pushed_n);
-            let mut answers = steps.iter().map(|step| step.answer);
-            if answers.any(|answer| answer != Answer::Outside) {
-                let (step, position) = (&steps.first, trajectory.position_m[row]);
-                let certificate = self.renderer.certificate(step, command);
-                let largest = trajectory
-                    .fingers()
-                    .map(|finger| self.renderer.map().largest_near_n_per_a(finger[row][2]));
-                let largest = largest.fold(0.0, f64::max);
-                self.bounds.add(certificate, largest, &flowing);
-                if let Some(felt) = &mut self.felt {
-                    felt.add(&self.renderer, position, step, command);
-                }
-            }
-        }
-        if drive.is_some() {
-            rows.commanded_a = commanded_a;
-        }
-        Ok(rows)
-    }
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Opened;
 use super::felt::FeltSummary;
+use super::follow::Followed;
 use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
@@ -110,7 +111,7 @@ pub struct ForceSummary {
     pub felt: Option<FeltSummary>,
 }
 
-/// Differences from the requested force vector, over the positions inside the map.
+/// Differences from the requested force vector, over the time inside the map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VectorErrors {
     /// Where the force points.
@@ -125,7 +126,7 @@ pub struct VectorErrors {
     pub direction_95_deg: f64,
 }
 
-/// Differences from the requested force, over the positions inside the map.
+/// Differences from the requested force, over the time inside the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorSummary {
     /// Root mean square, N.
@@ -284,18 +285,19 @@ impl ReplaySummary {
     pub(super) fn new(
         opened: &Opened,
         source: TrajectorySource,
-        rows: &ReplayRows,
+        followed: &Followed,
         dynamics: Option<DynamicsSummary>,
         bounds: &Bounds,
         warnings: Vec<String>,
     ) -> Self {
         let bundle = &opened.bundle;
         let robust = opened.renderer.setting().is_some();
+        let t_s = &followed.rows.t_s;
         let trajectory = Trajectory {
-            t_s: rows.t_s.clone(),
+            t_s: t_s.clone(),
             ..Trajectory::default()
         };
-        let times = Times::new(&trajectory);
+        let (rows, times) = (followed.measured(), Times::new(&followed.counts_s));
         let size = |most: f64, value: f64| most.max(value.abs());
         let direction = bundle.manifest.force.as_ref().map(|force| force.direction);
         let any = |answer: Answer| times.part(rows, |finger, row| finger.answer[row] == answer);
@@ -320,20 +322,16 @@ impl ReplaySummary {
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectorySummary {
                 source: source.source,
-                positions: rows.len(),
-                duration_s: rows
-                    .t_s
-                    .last()
-                    .zip(rows.t_s.first())
-                    .map_or(0.0, |(b, a)| b - a),
+                positions: t_s.len(),
+                duration_s: t_s.last().zip(t_s.first()).map_or(0.0, |(b, a)| b - a),
                 median_step_s: trajectory.median_step_s(),
             },
-            force: ForceSummary::of(&rows.first, &rows.t_s, direction),
+            force: ForceSummary::of(&rows.first, (&rows.t_s, &times), direction),
             two_fingers: rows.second.as_ref().map(|second| TwoFingers {
                 both_given_time_fraction: 1.0
                     - times.part(rows, |finger, row| finger.answer[row] != Answer::Ok),
                 magnets_force_n: 0.0,
-                second: ForceSummary::of(second, &rows.t_s, direction),
+                second: ForceSummary::of(second, (&rows.t_s, &times), direction),
             }),
             currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
@@ -359,59 +357,61 @@ impl ReplaySummary {
 
 impl ForceSummary {
     /// Of one finger, where the force requested points in `direction`.
-    fn of(rows: &FingerRows, t_s: &[f64], direction: Option<ForceDirection>) -> Self {
+    fn of(
+        rows: &FingerRows,
+        (t_s, times): (&[f64], &Times),
+        direction: Option<ForceDirection>,
+    ) -> Self {
         let largest = |most: f64, value: &f64| most.max(value.abs());
         Self {
             wanted_max_n: rows.wanted_force_n.iter().fold(0.0, largest),
-            feedback: errors(rows, t_s, |row| rows.error_n(row)),
-            fixed: errors(rows, t_s, |row| rows.static_error_n(row)),
-            vector: direction.and_then(|direction| vector_errors(rows, direction)),
+            feedback: errors(rows, (t_s, times), |row| rows.error_n(row)),
+            fixed: errors(rows, (t_s, times), |row| rows.static_error_n(row)),
+            vector: direction.and_then(|direction| vector_errors(rows, times, direction)),
             felt: None,
         }
     }
 }
 
 /// `None` where the upward force alone is requested.
-fn vector_errors(rows: &FingerRows, direction: ForceDirection) -> Option<VectorErrors> {
+fn vector_errors(
+    rows: &FingerRows,
+    times: &Times,
+    direction: ForceDirection,
+) -> Option<VectorErrors> {
     if rows.sideways_n.is_empty() {
         return None;
     }
-    let inside = rows.inside();
-    let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0);
     let mut angles_deg = Vec::new();
-    for row in inside {
+    let mut errors_n = Vec::new();
+    for row in rows.inside() {
         let ([wx, wy], [fx, fy]) = (rows.wanted_sideways_n[row], rows.sideways_n[row]);
-        let error = (wx - fx).hypot(wy - fy).hypot(rows.error_n(row));
-        square += error * error;
-        worst = worst.max(error);
-        count += 1;
+        errors_n.push((row, (wx - fx).hypot(wy - fy).hypot(rows.error_n(row))));
         if wx.hypot(wy).hypot(rows.wanted_force_n[row]) > 0.0 {
-            angles_deg.push(rows.direction_error_deg(row));
+            angles_deg.push((row, rows.direction_error_deg(row)));
         }
     }
-    angles_deg.sort_by(f64::total_cmp);
-    let quantile = |part: f64| {
-        let at = (part * angles_deg.len() as f64) as usize;
-        angles_deg.get(at).copied().unwrap_or(0.0)
-    };
+    angles_deg.sort_by(|(_, a), (_, b)| a.total_cmp(b));
     Some(VectorErrors {
         direction,
-        rms_error_n: (square / f64::from(count.max(1))).sqrt(),
-        worst_error_n: worst,
-        direction_median_deg: quantile(0.5),
-        direction_95_deg: quantile(0.95),
+        rms_error_n: times.rms(&errors_n),
+        worst_error_n: errors_n
+            .iter()
+            .fold(0.0, |worst, (_, error)| error.max(worst)),
+        direction_median_deg: times.quantile(&angles_deg, 0.5),
+        direction_95_deg: times.quantile(&angles_deg, 0.95),
     })
 }
 
-/// How long positions are held.
+/// How long rows count.
 struct Times {
     weights: Vec<f64>,
     total: f64,
 }
 
 impl Times {
-    fn new(trajectory: &Trajectory) -> Self {
-        let mut weights = trajectory.held_s();
+    fn new(counts_s: &[f64]) -> Self {
+        let mut weights = counts_s.to_vec();
         if weights.iter().sum::<f64>() == 0.0 {
             // All at one time: each counts alike.
             weights.fill(1.0);
@@ -427,6 +427,35 @@ impl Times {
         sum / self.total
     }
 
+    /// How much each of some rows counts; where none of them does, each alike.
+    fn among(&self, rows: impl Iterator<Item = usize>) -> Vec<f64> {
+        let weights: Vec<f64> = rows.map(|row| self.weights[row]).collect();
+        match weights.iter().all(|weight| *weight == 0.0) {
+            true => vec![1.0; weights.len()],
+            false => weights,
+        }
+    }
+
+    /// Root mean square of the values of some rows; 0 of none.
+    fn rms(&self, values: &[(usize, f64)]) -> f64 {
+        let weights = self.among(values.iter().map(|(row, _)| *row));
+        let squares = values.iter().zip(&weights).map(|((_, v), w)| w * v * v);
+        (squares.sum::<f64>() / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// The value of some rows, which ascend, that is exceeded for the rest of the time; 0 of none.
+    fn quantile(&self, ascending: &[(usize, f64)], part: f64) -> f64 {
+        let weights = self.among(ascending.iter().map(|(row, _)| *row));
+        let mut left = part * weights.iter().sum::<f64>();
+        for ((_, value), weight) in ascending.iter().zip(&weights) {
+            left -= weight;
+            if left < 0.0 {
+                return *value;
+            }
+        }
+        ascending.last().map_or(0.0, |(_, value)| *value)
+    }
+
     /// The part during which that holds of any finger.
     fn part(&self, rows: &ReplayRows, holds: impl Fn(&FingerRows, usize) -> bool) -> f64 {
         let any = |row: usize| rows.fingers().any(|finger| holds(finger, row));
@@ -434,12 +463,16 @@ impl Times {
     }
 }
 
-/// Errors over the positions inside the map.
-fn errors(rows: &FingerRows, t_s: &[f64], error: impl Fn(usize) -> f64) -> ErrorSummary {
+/// Errors over the time inside the map.
+fn errors(
+    rows: &FingerRows,
+    (t_s, times): (&[f64], &Times),
+    error: impl Fn(usize) -> f64,
+) -> ErrorSummary {
     let inside: Vec<usize> = rows.inside().collect();
-    let rms = |value: &dyn Fn(usize) -> f64| -> f64 {
-        let sum: f64 = inside.iter().map(|&row| value(row) * value(row)).sum();
-        (sum / inside.len().max(1) as f64).sqrt()
+    let rms = |value: &dyn Fn(usize) -> f64| {
+        let values: Vec<(usize, f64)> = inside.iter().map(|&row| (row, value(row))).collect();
+        times.rms(&values)
     };
     let (rms_error_n, wanted_n) = (rms(&error), rms(&|row| rows.wanted_force_n[row]));
     let worst = inside.iter().copied().reduce(|a, b| {

@@ -1,0 +1,240 @@
+//! The numbers along a trajectory that a runtime has no time for.
+
+use crate::RunError;
+use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
+use crate::bundle::trajectory::Trajectory;
+use crate::coil::drive::Drive;
+use crate::numerics::vec3::dot;
+use crate::progress::Progress;
+
+use super::PORTION;
+use super::felt::Felt;
+use super::renderer::{Renderer, Step};
+use super::summary::Bounds;
+
+/// While currents follow a command forces are looked at first after this share of the shortest time constant,
+const FIRST: f64 = 1.0 / 16.0;
+/// then after times longer by this factor each.
+const GROWTH: f64 = 1.3;
+
+/// A step of one finger or two.
+pub(super) struct Steps {
+    pub(super) first: Step,
+    second: Option<Step>,
+    /// Force of one magnet on the other, N.
+    pushed_n: f64,
+}
+
+impl Steps {
+    /// That of a row, its currents written to `currents_a`.
+    pub(super) fn take(
+        renderer: &mut Renderer,
+        trajectory: &Trajectory,
+        row: usize,
+        currents_a: &mut [f64],
+    ) -> Self {
+        let position_m = trajectory.position_m[row];
+        let Some(second_m) = trajectory.second_m.get(row) else {
+            let first = renderer.step(position_m, currents_a);
+            return Self {
+                first,
+                second: None,
+                pushed_n: 0.0,
+            };
+        };
+        let (steps, push_n) = renderer.pair_step([position_m, *second_m], currents_a);
+        let [first, second] = steps;
+        Self {
+            first,
+            second: Some(second),
+            pushed_n: dot(push_n, push_n).sqrt(),
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Step> {
+        std::iter::once(&self.first).chain(&self.second)
+    }
+
+    /// The force on each finger with these currents, N, right after its step.
+    fn given_n(&self, renderer: &Renderer, currents_a: &[f64]) -> [[f64; 3]; 2] {
+        match self.second {
+            None => [renderer.given_n(&self.first, currents_a), [0.0; 3]],
+            Some(second) => renderer.pair_given_n(&[self.first, second], currents_a),
+        }
+    }
+}
+
+/// What is measured along a trajectory.
+pub(super) struct Followed {
+    /// The table: a row a position, at the end of its time.
+    pub(super) rows: ReplayRows,
+    /// With currents that follow their command, times within those of the positions; else the rows are all there is.
+    pub(super) within: Option<ReplayRows>,
+    /// How long each of these counts, s.
+    pub(super) counts_s: Vec<f64>,
+}
+
+impl Followed {
+    /// The rows that errors, currents and heat are taken of.
+    pub(super) fn measured(&self) -> &ReplayRows {
+        self.within.as_ref().unwrap_or(&self.rows)
+    }
+}
+
+/// Goes through the positions again for the numbers that a runtime has no time for.
+pub(super) struct Follower {
+    pub(super) renderer: Renderer,
+    /// The bundle's static currents.
+    pub(super) fixed_a: Vec<f64>,
+    pub(super) bounds: Bounds,
+    /// That of the current loop, Hz, where the drivers close one.
+    pub(super) bandwidth_hz: Option<f64>,
+    /// Where currents are chosen for uncertainties.
+    pub(super) felt: Option<Felt>,
+    /// The largest force of one finger's magnet on the other's, N.
+    pub(super) pushed_n: f64,
+}
+
+/// A position with its step.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    trajectory: &'a Trajectory,
+    steps: &'a Steps,
+    row: usize,
+}
+
+impl Follower {
+    pub(super) fn rows(
+        &mut self,
+        trajectory: &Trajectory,
+        steps: &[Steps],
+        commanded_a: Vec<f64>,
+        mut drive: Option<&mut Drive>,
+        progress: &dyn Progress,
+    ) -> Result<Followed, RunError> {
+        let coils = self.renderer.coils();
+        let held_s = trajectory.held_s();
+        let empty = || ReplayRows {
+            coils,
+            second: (!trajectory.second_m.is_empty()).then(FingerRows::default),
+            ..ReplayRows::default()
+        };
+        let mut found = Followed {
+            rows: empty(),
+            within: drive.is_some().then(empty),
+            counts_s: Vec::new(),
+        };
+        let mut flowing = vec![0.0; coils];
+        let mut again = vec![0.0; coils];
+        for (row, steps) in steps.iter().enumerate() {
+            if row % PORTION == 0 {
+                progress.check()?;
+            }
+            let command = &commanded_a[row * coils..(row + 1) * coils];
+            Steps::take(&mut self.renderer, trajectory, row, &mut again);
+            flowing.copy_from_slice(command);
+            let at = At {
+                trajectory,
+                steps,
+                row,
+            };
+            if let Some(drive) = &mut drive {
+                if row == 0 {
+                    drive.settle(command);
+                }
+                self.follow(&mut found, at, (drive, command), held_s[row]);
+                drive.currents(&mut flowing);
+            } else {
+                found.counts_s.push(held_s[row]);
+            }
+            self.add(&mut found.rows, at, trajectory.t_s[row], &flowing);
+            self.pushed_n = self.pushed_n.max(steps.pushed_n);
+            let mut answers = steps.iter().map(|step| step.answer);
+            if answers.any(|answer| answer != Answer::Outside) {
+                let (step, position) = (&steps.first, trajectory.position_m[row]);
+                let certificate = self.renderer.certificate(step, command);
+                let largest = trajectory
+                    .fingers()
+                    .map(|finger| self.renderer.map().largest_near_n_per_a(finger[row][2]));
+                let largest = largest.fold(0.0, f64::max);
+                self.bounds.add(certificate, largest, &flowing);
+                if let Some(felt) = &mut self.felt {
+                    felt.add(&self.renderer, position, step, command);
+                }
+            }
+        }
+        if drive.is_some() {
+            found.rows.commanded_a = commanded_a;
+        }
+        Ok(found)
+    }
+
+    /// Lets the currents follow a command while a position is held, and adds what they give meanwhile: each part of the
+    /// time counts half at either end.
+    fn follow(
+        &self,
+        found: &mut Followed,
+        at: At,
+        (drive, command): (&mut Drive, &[f64]),
+        held_s: f64,
+    ) {
+        let mut flowing = vec![0.0; command.len()];
+        let [shortest_s, _] = drive.time_constants_s().unwrap_or_default();
+        let pace_s = self.bandwidth_hz.map_or(shortest_s, |bandwidth_hz| {
+            shortest_s.min(1.0 / (std::f64::consts::TAU * bandwidth_hz))
+        });
+        let (mut part_s, mut since_s, mut before_s) = (FIRST * pace_s, 0.0, 0.0);
+        loop {
+            // No short part is left over at the end.
+            let left_s = held_s - since_s;
+            let next_s = if left_s > 1.5 * part_s && part_s > 0.0 {
+                part_s
+            } else {
+                left_s
+            };
+            drive.currents(&mut flowing);
+            if let Some(within) = &mut found.within {
+                self.add(within, at, at.trajectory.t_s[at.row] + since_s, &flowing);
+                found.counts_s.push(0.5 * (before_s + next_s));
+            }
+            if left_s <= 0.0 {
+                break;
+            }
+            match self.bandwidth_hz {
+                None => drive.hold(command, next_s),
+                Some(bandwidth_hz) => drive.track(command, next_s, bandwidth_hz),
+            }
+            since_s = if next_s == left_s {
+                held_s
+            } else {
+                since_s + next_s
+            };
+            before_s = next_s;
+            part_s *= GROWTH;
+        }
+    }
+
+    /// Adds a row at `t_s` with the currents that flow.
+    fn add(&self, rows: &mut ReplayRows, at: At, t_s: f64, flowing: &[f64]) {
+        let (steps, row) = (at.steps, at.row);
+        rows.t_s.push(t_s);
+        let given_n = steps.given_n(&self.renderer, flowing);
+        let static_n = steps.given_n(&self.renderer, &self.fixed_a);
+        let fingers = std::iter::once(&mut rows.first).chain(&mut rows.second);
+        let all = fingers.zip(steps.iter()).zip(at.trajectory.fingers());
+        for (finger, ((rows, step), positions_m)) in all.enumerate() {
+            let [x, y, z] = given_n[finger];
+            rows.position_m.push(positions_m[row]);
+            rows.height_m.push(step.height_m);
+            rows.wanted_force_n.push(step.wanted_n);
+            rows.force_n.push(z);
+            if let Some(sideways) = step.sideways {
+                rows.wanted_sideways_n.push(sideways.wanted_n);
+                rows.sideways_n.push([x, y]);
+            }
+            rows.static_force_n.push(static_n[finger][2]);
+            rows.answer.push(step.answer);
+        }
+        rows.current_a.extend(flowing);
+    }
+}
