@@ -1094,8 +1094,14 @@ function values = read_npy(file, bytes, name, kind)
     end
     header_bytes = fread(file, 1, 'uint16');
     header = fread(file, [1, header_bytes], 'uint8=>char');
-    found = regexp(header, ['''descr'': ''<(f8|i8)'', ''fortran_order'': False, ' ...
-                            '''shape'': \(([0-9, ]*)\),? *\}\s*$'], 'tokens', 'once');
+    if ~isempty(header) && header(end) == char(10)
+        header(end) = [];
+    end
+    found = regexp(header(header ~= ' '), ['^\{''descr'':''<(f8|i8)'',''fortran_order'':False,' ...
+                                           '''shape'':\(((?:\d+,)*\d*)\),?\}$'], 'tokens', 'once');
+    if any(header < ' ') || ~isempty(regexp(header, '\d +\d', 'once'))
+        found = {};                               % spaces are the only blanks, and part no number
+    end
     if isempty(found) || ~strcmp(found{1}, kind)
         error('fluxform:bundle', '%s must hold numbers of kind %s in C order', name, kind);
     end

@@ -1,7 +1,8 @@
 //! Headers of NPY 1.0 arrays: little-endian, C order, f64 or i64.
 //!
 //! The grammar that is read is the one numpy writes, nothing more: an untrusted header must not
-//! get a Python parser to play with.
+//! get a Python parser to play with. All loaders accept the same headers: spaces aside where they part
+//! no number, and a line feed at the end.
 
 /// The first bytes of an NPY 1.0 file; two bytes of header length follow.
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
@@ -45,11 +46,7 @@ pub(super) fn parse<'a>(file: &'a [u8], kind: &str) -> Result<(Vec<usize>, &'a [
     let (text, data) = rest
         .split_at_checked(length)
         .ok_or("ends within its header")?;
-    let text: String = text
-        .iter()
-        .map(|&byte| char::from(byte))
-        .filter(|c| !c.is_ascii_whitespace())
-        .collect();
+    let text = without_blanks(text.strip_suffix(b"\n").unwrap_or(text));
     let shape = text
         .strip_prefix(&format!(
             "{{'descr':'{kind}','fortran_order':False,'shape':("
@@ -67,8 +64,9 @@ pub(super) fn parse<'a>(file: &'a [u8], kind: &str) -> Result<(Vec<usize>, &'a [
     let shape: Vec<usize> = shape
         .split_terminator(',')
         .map(|size| {
-            size.parse()
-                .map_err(|_| format!("has a bad dimension {size:?}"))
+            let digits = size.bytes().all(|byte| byte.is_ascii_digit());
+            let number = digits.then(|| size.parse().ok()).flatten();
+            number.ok_or_else(|| format!("has a bad dimension {size:?}"))
         })
         .collect::<Result<_, _>>()?;
     let elements = shape
@@ -83,6 +81,24 @@ pub(super) fn parse<'a>(file: &'a [u8], kind: &str) -> Result<(Vec<usize>, &'a [
         ));
     }
     Ok((shape, data))
+}
+
+/// The characters of a header without its spaces; one stays between two digits, which are no number together.
+fn without_blanks(text: &[u8]) -> String {
+    let mut left = String::new();
+    let mut blank = false;
+    for &byte in text {
+        if byte == b' ' {
+            blank = true;
+            continue;
+        }
+        if blank && byte.is_ascii_digit() && left.ends_with(|c: char| c.is_ascii_digit()) {
+            left.push(' ');
+        }
+        left.push(char::from(byte));
+        blank = false;
+    }
+    left
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use fluxform::bundle::artefact::sha256_hex;
 use fluxform::bundle::json::to_json;
@@ -181,21 +181,70 @@ const DAMAGES: &[Damage] = &[
     ("a header of more keys", |a| {
         a.reword("resistance_ohm", ", }", ",x}")
     }),
+    // Broke: Octave read it.
+    ("a header that does not begin", |a| {
+        a.reword("resistance_ohm", "{", " ")
+    }),
+    // Broke: the library and Python read these seven, Octave all but the last.
+    ("a tab behind the header", |a| {
+        a.reword("resistance_ohm", "}  ", "} \t")
+    }),
+    ("a line feed behind the header", |a| {
+        a.reword("resistance_ohm", "}  ", "}\n ")
+    }),
+    ("two line feeds at the end", |a| {
+        a.reword("resistance_ohm", " \n", "\n\n")
+    }),
+    ("a vertical tab behind the header", |a| {
+        a.reword("resistance_ohm", "}  ", "}\x0b ")
+    }),
+    ("a form feed behind the header", |a| {
+        a.reword("resistance_ohm", "}  ", "}\x0c ")
+    }),
+    ("a carriage return at the end", |a| {
+        a.reword("resistance_ohm", " \n", "\r\n")
+    }),
+    ("a tab in the header", |a| {
+        a.reword("resistance_ohm", ": (", ":\t(")
+    }),
+    // Broke: the library and Python read it.
+    ("a space in a number", |a| {
+        a.reword("x_m", "(13,), } ", "(1 3,), }")
+    }),
+    // Broke: the library read it.
+    ("a sign in the shape", |a| {
+        a.reword("resistance_ohm", "(4,), } ", "(+4,), }")
+    }),
+    // Broke: Octave read it.
+    ("two commas in the shape", |a| {
+        a.reword("resistance_ohm", "(4,), } ", "(4,,), }")
+    }),
 ];
 
-/// Bundles with such archives, their digests sealed.
-fn malformed(folder: &Path) -> Vec<(&'static str, PathBuf)> {
-    let sample = sample(false, [4, 4, 4]);
+/// Other forms of a header, which every loader reads.
+const FORMS: &[Damage] = &[
+    ("spaces elsewhere", |a| {
+        a.reword("resistance_ohm", "(4,), } ", " ( 4 ) }")
+    }),
+    ("no space", |a| {
+        a.reword("inductance_h", ": (4, 4), } ", ":(4,4)}     ")
+    }),
+    ("no line feed", |a| a.reword("resistance_ohm", " \n", "  ")),
+];
+
+/// Bundles with such archives, their digests sealed: those that every loader reads, and those that none does.
+fn bundles(folder: &Path) -> [Vec<(&'static str, PathBuf)>; 2] {
+    let sample = sample(false, [13, 4, 4]);
     let good = folder.join("good");
     sample.write(&good, false).unwrap();
     let bytes = fs::read(good.join("map.npz")).unwrap();
     let whole = Archive::of(&bytes);
     assert_eq!(whole.bytes(), bytes);
-    let damaged = DAMAGES.iter().map(|(name, damage)| {
+    let changed = |(name, change): &Damage| {
         let mut archive = whole.clone();
-        damage(&mut archive);
+        change(&mut archive);
         (*name, archive.bytes())
-    });
+    };
     let edited = [
         ("bytes behind the end", [bytes.as_slice(), &[0; 5]].concat()),
         (
@@ -206,23 +255,23 @@ fn malformed(folder: &Path) -> Vec<(&'static str, PathBuf)> {
         ("an end record alone", bytes[bytes.len() - 22..].to_vec()),
         ("nothing", Vec::new()),
     ];
-    damaged
-        .chain(edited)
-        .enumerate()
-        .map(|(number, (name, map))| {
-            let target = folder.join(format!("bundle{number}"));
-            let mut manifest = sample.write(&target, false).unwrap();
-            let entry = manifest
-                .files
-                .iter_mut()
-                .find(|file| file.path == "map.npz")
-                .unwrap();
-            (entry.bytes, entry.sha256) = (map.len() as u64, sha256_hex(&map));
-            fs::write(target.join("map.npz"), map).unwrap();
-            fs::write(target.join("manifest.json"), to_json(&manifest).unwrap()).unwrap();
-            (name, target)
-        })
-        .collect()
+    let written = |(name, map): (&'static str, Vec<u8>)| {
+        let target = folder.join(name.replace(' ', "_"));
+        let mut manifest = sample.write(&target, false).unwrap();
+        let entry = manifest
+            .files
+            .iter_mut()
+            .find(|file| file.path == "map.npz")
+            .unwrap();
+        (entry.bytes, entry.sha256) = (map.len() as u64, sha256_hex(&map));
+        fs::write(target.join("map.npz"), map).unwrap();
+        fs::write(target.join("manifest.json"), to_json(&manifest).unwrap()).unwrap();
+        (name, target)
+    };
+    let read = FORMS.iter().map(changed).map(written);
+    let read = [("good", good.clone())].into_iter().chain(read).collect();
+    let damaged = DAMAGES.iter().map(changed).chain(edited);
+    [read, damaged.map(written).collect()]
 }
 
 const OCTAVE: &str = "addpath(getenv('FLUXFORM_SCRIPTS'));
@@ -236,42 +285,56 @@ for k = 1:numel(folders)
     end
 end";
 
-fn the_library_refuses_malformed_archives() {
+/// `load` reads the bundles that it should, and refuses the others in words that contain `named`.
+fn only_malformed_are_refused(named: &str, load: impl Fn(&Path) -> Result<(), String>) {
     let folder = tempfile::tempdir().unwrap();
-    let bundles = malformed(folder.path());
-    let read: Vec<&str> = bundles
-        .iter()
-        .filter(|(_, target)| Bundle::open(target).is_ok())
-        .map(|(name, _)| *name)
-        .collect();
-    assert_eq!(read, [""; 0], "the library reads them");
-    Bundle::open(&folder.path().join("good")).unwrap();
+    let [read, damaged] = bundles(folder.path());
+    for (name, target) in read {
+        assert_eq!(load(&target), Ok(()), "{name}");
+    }
+    for (name, target) in damaged {
+        let refused = load(&target).expect_err(name);
+        assert!(refused.contains(named), "{name}: {refused}");
+    }
+}
+
+fn the_library_refuses_malformed_archives() {
+    only_malformed_are_refused("", |target| {
+        let loaded = Bundle::open(target);
+        loaded.map(drop).map_err(|error| error.to_string())
+    });
+}
+
+/// What a loader that is a program answers.
+fn answered(ran: Ran) -> Result<(), String> {
+    match ran.code {
+        Some(0) => Ok(()),
+        Some(3) => Err(ran.err),
+        _ => panic!("{ran:?}"),
+    }
 }
 
 fn python_refuses_malformed_archives() {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, target) in malformed(folder.path()) {
-        let ran = python_loads(&target);
-        assert_eq!(ran.code, Some(3), "{name}: {}", ran.err);
-        assert!(ran.err.contains("map.npz"), "{name}: {}", ran.err);
-    }
+    only_malformed_are_refused("map.npz", |target| answered(python_loads(target)));
 }
 
 fn c_refuses_malformed_archives() {
     let folder = tempfile::tempdir().unwrap();
     let program = c_loader(folder.path(), &[]);
-    for (name, target) in malformed(folder.path()) {
-        let output = Command::new(&program).arg(target.join("map.npz")).output();
-        assert_eq!(output.unwrap().status.code(), Some(3), "{name}");
-    }
+    only_malformed_are_refused("", |target| {
+        let mut c = Command::new(&program);
+        c.arg(target.join("map.npz")).stdin(Stdio::null());
+        answered(Ran::of(c.output().unwrap()))
+    });
 }
 
 fn octave_refuses_malformed_archives() {
     let folder = tempfile::tempdir().unwrap();
-    let bundles = malformed(folder.path());
-    let folders: String = std::iter::once(folder.path().join("good"))
-        .chain(bundles.iter().map(|(_, target)| target.clone()))
-        .map(|target| format!("{}\n", target.display()))
+    let [read, damaged] = bundles(folder.path());
+    let folders: String = read
+        .iter()
+        .chain(&damaged)
+        .map(|(_, target)| format!("{}\n", target.display()))
         .collect();
     fs::write(folder.path().join("folders.txt"), folders).unwrap();
     let output = Command::new("octave-cli")
@@ -282,8 +345,10 @@ fn octave_refuses_malformed_archives() {
         .unwrap();
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     let mut answers = printed.lines();
-    assert_eq!(answers.next(), Some("read"), "{printed}");
-    for (name, _) in &bundles {
+    for (name, _) in &read {
+        assert_eq!(answers.next(), Some("read"), "{name}: {printed}");
+    }
+    for (name, _) in &damaged {
         assert_eq!(answers.next(), Some("fluxform:bundle"), "{name}");
     }
 }

@@ -44,10 +44,12 @@ OPTIONAL_ARRAYS = (
     "working_point_gz_t_per_m", "total_current_max_a", "lambda_n_per_m", "height_x_m",
     "height_y_m", "height_m", "has_height", "static_current_a", "inductance_h", "voltage_v",
 )
-# Headers as numpy writes them, blanks left out, and no others: no parser of Python's sees them.
+# Headers as numpy writes them, spaces left out, and no others: no parser of Python's sees them.
 HEADER = re.compile(
     rb"\{'descr':'(<f8|<i8)','fortran_order':False,'shape':\(((?:\d{1,18},)*(?:\d{1,18})?)\),?\}"
 )
+# A space may be anywhere but in a number.
+PARTED = re.compile(rb"\d +\d")
 MANIFEST_MAX_BYTES = 64 << 20
 # Larger files are none of a bundle's; of one beyond HOLES_FROM bytes at least one byte in HOLES_SHARE
 # lies on the disk: a file of holes takes far more memory than it took to make.
@@ -662,7 +664,9 @@ def _array(name, data):
     if data[:8] != b"\x93NUMPY\x01\x00" or len(data) < 10:
         raise BundleError(f"map.npz: {name} is not an NPY 1.0 array")
     start = 10 + int.from_bytes(data[8:10], "little")
-    header = HEADER.fullmatch(b"".join(data[10:start].split()))
+    text = data[10:start]
+    text = text[:-1] if text.endswith(b"\n") else text
+    header = None if PARTED.search(text) else HEADER.fullmatch(text.replace(b" ", b""))
     kind = "<i8" if name in ("coil", "schema_version") else "<f8"
     if start > len(data) or not header or header[1].decode() != kind:
         raise BundleError(f"map.npz: {name} must hold {kind!r} in C order")
