@@ -6,20 +6,52 @@
  * vector also the vector wanted, the sideways force given [N] and the vectors of force per ampere of every coil; for
  * those made with uncertainties the force given along x, y and z [N] and the currents [A] chosen for them.
  * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes, with a third
- * argument that of currents chosen for uncertainties:
+ * argument that of currents chosen for uncertainties. A line that is no position ends it with code 3; `nan` is a number:
  *   cc -std=c99 -O2 fluxform_replay.c fluxform_bundle.c fluxform_currents.c -o replay -lm
  */
 #include "fluxform_bundle.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
+
+#define BLANKS " \t\r\n"
+
+/* The next position on standard input, blank lines aside: 1 read, 0 at the end, -1 for a line that is no position. */
+static int read_position(double *at, size_t *number)
+{
+    char line[256];
+    while (fgets(line, sizeof line, stdin)) {
+        const int whole = strchr(line, '\n') || feof(stdin);
+        const char *rest = line + strspn(line, BLANKS);
+        size_t count = 0;
+        ++*number;
+        if (whole && !*rest)
+            continue;
+        for (; count < 3; count++) {
+            char *end;
+            at[count] = strtod(rest, &end);
+            if (end == rest || !strchr(BLANKS, *end))
+                break;
+            rest = end + strspn(end, BLANKS);
+        }
+        if (whole && count == 3 && !*rest)
+            return 1;
+        fprintf(stderr, "line %lu: invalid position: expected x y z, three numbers\n", (unsigned long)*number);
+        return -1;
+    }
+    return 0;
+}
 
 static int tell(fluxform_bundle *bundle, double *force, double *current)
 {
-    double x, y, z, pull, *vectors = current + bundle->coil_count;
+    double at[3], pull, *vectors = current + bundle->coil_count;
+    size_t number = 0;
     fluxform_step step;
-    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
+    int outcome;
+    while ((outcome = read_position(at, &number)) > 0) {
+        const double x = at[0], y = at[1], z = at[2];
         int answer;
         fluxform_force_per_ampere(bundle, x, y, z, force);
         for (size_t i = 0; i < bundle->coil_count; i++)
@@ -44,14 +76,15 @@ static int tell(fluxform_bundle *bundle, double *force, double *current)
         }
         printf("\n");
     }
-    return 0;
+    return outcome ? 3 : 0;
 }
 
 static int measure(fluxform_bundle *bundle, double *current, long repeats, int robust)
 {
-    size_t count = 0, room = 0;
+    size_t count = 0, room = 0, number = 0;
     double *at = NULL, p[3], sum = 0, best = 1e300;
-    while (scanf("%lf %lf %lf", &p[0], &p[1], &p[2]) == 3) {
+    int outcome;
+    while ((outcome = read_position(p, &number)) > 0) {
         if (count == room) {
             double *more = realloc(at, (room = 2 * room + 1024) * 3 * sizeof *at);
             if (!more) {
@@ -63,6 +96,10 @@ static int measure(fluxform_bundle *bundle, double *current, long repeats, int r
         for (size_t k = 0; k < 3; k++)
             at[3 * count + k] = p[k];
         count++;
+    }
+    if (outcome) {
+        free(at);
+        return 3;
     }
     for (long run = 0; run < repeats && count; run++) {
         clock_t start = clock();

@@ -6,6 +6,8 @@
  */
 #include "fluxform_bundle.hpp"
 
+#include <cstdlib>
+#include <cstring>
 #include <iostream>
 #include <limits>
 
@@ -15,12 +17,39 @@ static void print(const std::vector<double> &numbers)
         std::cout << ' ' << number;
 }
 
+/* The next position on standard input, blank lines aside; false at the end. */
+static bool read_position(fluxform::Vector &at, std::size_t &number)
+{
+    const char *const blanks = " \t\r\n";
+    std::string line;
+    while (std::getline(std::cin, line)) {
+        const char *rest = line.c_str() + std::strspn(line.c_str(), blanks);
+        const char *const last = line.c_str() + line.size();
+        std::size_t count = 0;
+        ++number;
+        if (rest == last)
+            continue;
+        for (; count < 3; count++) {
+            char *end;
+            at[count] = std::strtod(rest, &end);
+            if (end == rest || !std::strchr(blanks, *end))
+                break;
+            rest = end + std::strspn(end, blanks);
+        }
+        if (count == 3 && rest == last)
+            return true;
+        throw fluxform::Error("line " + std::to_string(number) + ": invalid position: expected x y z, three numbers");
+    }
+    return false;
+}
+
 static void tell(fluxform::Bundle bundle)
 {
     std::vector<double> current(bundle.coil_count()), force(current), vectors(3 * current.size());
     fluxform::Vector at;
+    std::size_t number = 0;
     std::cout.precision(std::numeric_limits<double>::max_digits10);
-    while (std::cin >> at[0] >> at[1] >> at[2]) {
+    while (read_position(at, number)) {
         bundle.force_per_ampere(at, force);
         const fluxform::Step step = bundle.currents(at, current);
         print(force);

@@ -14,6 +14,7 @@ use fluxform::commands::replay::renderer::{Renderer, Step};
 use fluxform_testing::bundle::*;
 use fluxform_testing::loaders::{c_loader, cpp_loader};
 use fluxform_testing::needs::{self, SANITIZERS, Trial};
+use fluxform_testing::run::Ran;
 use fluxform_testing::{Random, root, trials};
 use tempfile::TempDir;
 
@@ -29,9 +30,13 @@ pub fn trials() -> Vec<Trial> {
         ],
         needs::c_compiler() => [
             c_gives_the_forces_of_the_library,
+            regression_c_ended_in_silence_at_a_line_that_is_no_position,
             extreme_limits_give_the_same_currents_in_c,
         ],
-        needs::cpp_compiler() => [cpp_gives_the_forces_of_the_library],
+        needs::cpp_compiler() => [
+            cpp_gives_the_forces_of_the_library,
+            regression_cpp_ended_in_silence_at_nan_and_what_is_no_position,
+        ],
         needs::sanitizers() => [the_c_loader_survives_damaged_files],
     }
 }
@@ -69,24 +74,27 @@ fn numbers(line: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Runs a program on the positions as lines of text and parses the forces it prints.
-fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Vec<Vec<f64>> {
+/// Runs a program on a text.
+fn given(command: &mut Command, text: String) -> Ran {
     let mut child = command
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let text: String = at
-        .iter()
-        .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
-        .collect();
     let mut stdin = child.stdin.take().unwrap();
     let feeder = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
     let output = child.wait_with_output().unwrap();
     feeder.join().unwrap().unwrap();
-    assert!(output.status.success(), "{command:?} failed");
-    let text = String::from_utf8(output.stdout).unwrap();
-    text.lines().map(numbers).collect()
+    Ran::of(output)
+}
+
+/// Runs a program on the positions as lines of text and parses the forces it prints.
+fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Vec<Vec<f64>> {
+    let lines = at.iter().map(|p| format!("{} {} {}\n", p[0], p[1], p[2]));
+    let ran = given(&mut command, lines.collect());
+    assert_eq!(ran.code, Some(0), "{command:?} failed: {}", ran.err);
+    ran.out.lines().map(numbers).collect()
 }
 
 const PYTHON_READS_STDIN: &str = "\
@@ -297,6 +305,48 @@ fn c_gives_the_forces_of_the_library() {
 
 fn cpp_gives_the_forces_of_the_library() {
     forces_on_samples(Some(&Loader::cpp()));
+}
+
+/// Every line is answered, `nan` too, up to one that is no position, which is named.
+fn lines_that_are_no_position(loader: &Loader, modes: &[&[&str]]) {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("bundle");
+    sample(false, [4, 4, 4]).write(&target, false).unwrap();
+    for bad in [
+        "0 0",
+        "0 0 0.05 0",
+        "0,0,0.05",
+        "0 0 high",
+        "0.1.2 0.05",
+        "0 0 0.05\0",
+        "\0",
+    ] {
+        let text = format!("0 0 0.05\n \r\nnan -0.01\t5e-2\r\n inf 0 0.05\n{bad}\n0 0 0.05\n");
+        for mode in modes {
+            let mut command = Command::new(&loader.program);
+            command.arg(target.join("map.npz")).args(*mode);
+            let ran = given(&mut command, text.clone());
+            assert_eq!(ran.code, Some(3), "{bad:?} {mode:?}");
+            assert!(ran.err.starts_with("line 5: "), "{bad:?}: {}", ran.err);
+            if mode.is_empty() {
+                let lines: Vec<Vec<f64>> = ran.out.lines().map(numbers).collect();
+                let answers: Vec<f64> = lines.iter().map(|line| line[COILS + 2]).collect();
+                assert_eq!(answers, [0.0, 2.0, 2.0], "{bad:?}");
+            }
+        }
+    }
+    // The last line needs no line feed.
+    let mut command = Command::new(&loader.program);
+    let ran = given(command.arg(target.join("map.npz")), "\n0 0 0.05".to_owned());
+    assert_eq!((ran.code, ran.out.lines().count()), (Some(0), 1));
+}
+
+fn regression_c_ended_in_silence_at_a_line_that_is_no_position() {
+    lines_that_are_no_position(&Loader::c(), &[&[], &["1"]]);
+}
+
+fn regression_cpp_ended_in_silence_at_nan_and_what_is_no_position() {
+    lines_that_are_no_position(&Loader::cpp(), &[&[]]);
 }
 
 /// Broke: with a lower limit of -1e30 A the C loader answered 8 A where the sum may be 5 A.
