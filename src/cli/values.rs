@@ -453,14 +453,24 @@ pub fn box_of(text: &str) -> Result<[[f64; 2]; 3], String> {
 pub fn setting(text: &str) -> Result<(String, toml::Value), String> {
     let Some((key, value)) = text
         .split_once('=')
-        .filter(|(key, _)| !key.trim().is_empty())
+        .map(|(key, value)| (key.trim(), value.trim()))
+        .filter(|(key, _)| !key.is_empty())
     else {
         return Err("expected KEY=VALUE, like array.pitch_mm=40".to_owned());
     };
-    let table: Option<toml::Table> = format!("value = {}", value.trim()).parse().ok();
-    let parsed = table.and_then(|mut table| table.remove("value"));
-    let value = parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned()));
-    Ok((key.trim().to_owned(), value))
+    let document: Result<toml::Table, _> = format!("value = {value}").parse();
+    let value = match (value.parse(), document) {
+        (Ok(value), _) => value,
+        // A comment, or another key on another line.
+        (Err(_), Ok(_)) => {
+            return Err(format!(
+                "{key} has more behind its value in {value:?}: give one value, another --set for another key, \
+                 and quotes around a text that contains #"
+            ));
+        }
+        (Err(_), Err(_)) => toml::Value::String(value.to_owned()),
+    };
+    Ok((key.to_owned(), value))
 }
 
 /// A number of threads.
@@ -528,6 +538,22 @@ mod tests {
         assert_eq!(moved, Translation([0.0, -0.01, 0.03]));
         assert_eq!(ends("-5cm,50").unwrap(), Ends([-0.05, 0.05]));
         assert_eq!(box_of("-1,1,-1,1,0,3cm").unwrap()[2], [0.0, 0.03]);
+    }
+
+    /// `array.rows=4#x` set 4, and so did a second line with another key.
+    #[test]
+    fn regression_what_followed_a_value_was_dropped() {
+        let value = |text: &str| setting(&format!(" array.rows = {text}")).unwrap().1;
+        assert_eq!(value("4").as_integer(), Some(4));
+        assert_eq!(value("[1, # one\n 2]").as_array().unwrap().len(), 2);
+        assert_eq!(value("{ a = 1.3 }")["a"].as_float(), Some(1.3));
+        for text in ["repel", "4,7", "a#b", "\"a # b\"", ""] {
+            assert_eq!(value(text).as_str(), Some(text.trim_matches('"')));
+        }
+        for more in ["4#x", "4 # x", "4\ncolumns=7", "\"a\"#b", "4\n[wire]\nx=1"] {
+            let refused = setting(&format!("array.rows={more}")).unwrap_err();
+            assert!(refused.contains("array.rows has more behind"), "{refused}");
+        }
     }
 
     #[test]

@@ -67,16 +67,25 @@ impl Template {
     ///
     /// # Errors
     /// A key that leads through something that is no section, or to a table that is not there or not
-    /// determined; the message names it.
+    /// determined; a key that is set twice, or with a part of it; the message names it.
     pub fn with<'a>(
         &self,
         settings: impl IntoIterator<Item = (&'a str, Value)>,
     ) -> Result<String, String> {
-        let mut table = self.table.clone();
+        let mut changed = self.clone();
+        let mut places: Vec<(&str, String)> = Vec::new();
         for (key, value) in settings {
-            set(&mut table, key, value)?;
+            let place = changed.place(key)?;
+            let other = places
+                .iter()
+                .find(|(_, other)| is_within(&place, other) || is_within(other, &place));
+            if let Some((other, _)) = other {
+                return Err(set_twice(other, key));
+            }
+            set(&mut changed.table, key, value)?;
+            places.push((key, place));
         }
-        Ok(table.to_string())
+        Ok(changed.table.to_string())
     }
 
     /// The one spelling of a key of this document: with the index of a table that is one of several,
@@ -103,6 +112,21 @@ impl Template {
             path = rest;
         }
         Ok(place + path)
+    }
+}
+
+/// Whether `key` is `other` or a part of it.
+#[must_use]
+pub fn is_within(key: &str, other: &str) -> bool {
+    let rest = key.strip_prefix(other);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+fn set_twice(first: &str, second: &str) -> String {
+    if first == second {
+        format!("{first} is set twice: give it one value")
+    } else {
+        format!("{first} and {second} set the same key: give all of it in one of them")
     }
 }
 
@@ -262,6 +286,42 @@ mod tests {
             assert!(refused.contains(said), "{refused}");
             assert_eq!(two.place(key).unwrap_err(), refused);
         }
+    }
+
+    /// The first of two values of a key was lost.
+    #[test]
+    fn regression_a_key_was_set_twice() {
+        let several = || Value::Array(vec![Value::Table(Table::new())]);
+        let number = || Value::Float(1.3);
+        for (settings, said) in [
+            (
+                [
+                    ("wire.diameter_mm", number()),
+                    ("wire.diameter_mm", number()),
+                ],
+                "wire.diameter_mm is set twice",
+            ),
+            (
+                [
+                    ("array.rows", number()),
+                    ("array", Value::Table(Table::new())),
+                ],
+                "array.rows and array set the same key",
+            ),
+            (
+                [("iron", several()), ("iron.size_mm", number())],
+                "iron and iron.size_mm set the same key",
+            ),
+            (
+                [("iron.size_mm", number()), ("iron.0.size_mm", number())],
+                "iron.size_mm and iron.0.size_mm set the same key",
+            ),
+        ] {
+            let refused = template().with(settings).unwrap_err();
+            assert!(refused.contains(said), "{refused}");
+        }
+        let apart = [("wire.choices_mm", number()), ("wire.choices", number())];
+        template().with(apart).unwrap();
     }
 
     #[test]

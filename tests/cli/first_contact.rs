@@ -129,6 +129,28 @@ fn init_sets_keys_and_replaces_nothing_without_force() {
         .run(&["init", "desk", "--set", "array.pitch_mm=10"])
         .ends(3)
         .says(&["pitch"]);
+    // Broke: of each of these a value was lost in silence.
+    for (surplus, said) in [
+        (
+            ["--set", "name=foo", "--name", "bar"],
+            "--name and --set name both name the design",
+        ),
+        (
+            ["--set", "array.pitch_mm=30", "--set", "array.pitch_mm=40"],
+            "array.pitch_mm is set twice",
+        ),
+        (
+            ["--set", "array.rows=4#x", "--out", "new"],
+            "array.rows has more behind its value",
+        ),
+        (
+            ["--set", "array.rows=4\ncolumns=7", "--out", "new"],
+            "another --set for another key",
+        ),
+    ] {
+        let args = [["init", "desk", "--force"].as_slice(), &surplus].concat();
+        place.run(&args).ends(2).says(&[said]);
+    }
     let reported = place
         .run(&["init", "coil", "--out", "new", "--format", "json"])
         .ends(0)

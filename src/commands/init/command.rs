@@ -135,15 +135,14 @@ impl Init {
             }
         };
         let mut request = self.request(start, object);
-        if request.name.is_none() {
+        if request.name.is_none() && !request.sets("name") {
             request.name = Some(ask("Name of the design? ", start.name())?);
         }
         for (key, question) in [
             ("array.pitch_mm", "Distance of neighbouring coils, mm? "),
             ("supply.current_max_a", "Largest current of a coil, A? "),
         ] {
-            let known = request.settings.iter().any(|(set, _)| set == key);
-            if known || (key.starts_with("array") && start == Start::Coil) {
+            if request.sets(key) || (key.starts_with("array") && start == Start::Coil) {
                 continue;
             }
             let answer = ask(question, "as in the template")?;

@@ -115,6 +115,13 @@ pub struct Request {
     pub settings: Vec<(String, Value)>,
 }
 
+impl Request {
+    /// Whether `key` is among the keys that are set.
+    fn sets(&self, key: &str) -> bool {
+        self.settings.iter().any(|(set, _)| set == key)
+    }
+}
+
 /// A design and a shape that calibrate as they are.
 #[derive(Debug, Clone)]
 pub struct Documents {
@@ -129,7 +136,7 @@ pub struct Documents {
 /// Why there are no documents.
 #[derive(Debug)]
 pub enum Refusal {
-    /// A key that leads nowhere.
+    /// A key that leads nowhere, or is set twice.
     Setting(String),
     /// A design that no command would take.
     Design(InvalidDocument),
@@ -146,6 +153,10 @@ pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     let template = Template::new(request.start.toml(), source).map_err(Refusal::Design)?;
     let mut settings = request.settings.clone();
     if let Some(name) = &request.name {
+        if request.sets("name") {
+            let message = "--name and --set name both name the design: leave one of them out";
+            return Err(Refusal::Setting(message.to_owned()));
+        }
         settings.push(("name".to_owned(), Value::String(name.clone())));
     }
     let text = text_of(&template, &settings)?;

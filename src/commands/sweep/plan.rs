@@ -12,7 +12,7 @@ use crate::coil::array_search::search::NOTHING_SEARCHED;
 use crate::commands::discretize::with_surface;
 use crate::design::named_file::{NamedFile, Role};
 use crate::design::search::SearchSpace;
-use crate::design::template::Template;
+use crate::design::template::{Template, is_within};
 use crate::design::{Design, InvalidDocument, Severity, source};
 use crate::scene::named_files::NamedContent;
 use crate::scene::sources::ShapeSource;
@@ -58,12 +58,6 @@ impl PlanRequest {
         }
         Ok(points)
     }
-}
-
-/// Whether `key` is `other` or a part of it.
-fn is_within(key: &str, other: &str) -> bool {
-    let rest = key.strip_prefix(other);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
 /// That no key is set twice: where each axis' key is in the design, in `places`.
