@@ -158,3 +158,23 @@ fn init_sets_keys_and_replaces_nothing_without_force() {
     assert_eq!(reported["design"], "new/coil.toml");
     place.run(&["evaluate", "new/coil.toml"]).ends(0);
 }
+
+/// A second body of steel and what a search varies were taken and not written.
+#[test]
+fn regression_init_left_out_tables_that_set_names() {
+    let place = Place::empty();
+    let iron = "iron=[{shape='ball',diameter_mm=3,center_mm=[0,0,-60]},{shape='ball',diameter_mm=5,center_mm=[0,0,-80]}]";
+    place
+        .run(&[
+            "init",
+            "desk",
+            "--set",
+            iron,
+            "--set",
+            "search.array.rows=[2,4]",
+        ])
+        .ends(0);
+    let text = place.text("desk.toml");
+    assert_eq!(text.matches("\n[[iron]]\n").count(), 2, "{text}");
+    assert!(text.contains("\n[search.array]\n"), "{text}");
+}
