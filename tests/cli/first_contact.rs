@@ -159,6 +159,38 @@ fn init_sets_keys_and_replaces_nothing_without_force() {
     place.run(&["evaluate", "new/coil.toml"]).ends(0);
 }
 
+/// `init --help` said that both files calibrate whatever is set, and that every key is in them.
+#[test]
+fn regression_init_promised_what_set_files_and_shapes_do_not_hold() {
+    let place = Place::empty();
+    let help = place.run(&["init", "--help"]).ends(0).out;
+    let help: Vec<&str> = help.split_whitespace().collect();
+    let help = help.join(" ");
+    for said in [
+        "Without --set both calibrate as they are.",
+        "The design has every key of a design (`fluxform keys design`), the shape those of its primitive",
+    ] {
+        assert!(help.contains(said), "{help}");
+    }
+    let curve = [
+        "init",
+        "desk",
+        "--out",
+        "new",
+        "--set",
+        "core.bh_curve=steel.csv",
+    ];
+    place
+        .run(&curve)
+        .ends(0)
+        .says(&["warning: core.bh_curve: new/steel.csv does not exist"]);
+    let json = [curve.as_slice(), &["--format", "json"]].concat();
+    let warnings = place.run(&json).ends(0).json()["warnings"].clone();
+    assert_eq!(warnings.as_array().unwrap().len(), 1, "{warnings}");
+    place.write("new/steel.csv", "h_a_per_m,b_t\n0,0\n");
+    assert_eq!(place.run(&curve).ends(0).err, "");
+}
+
 /// A second body of steel and what a search varies were taken and not written.
 #[test]
 fn regression_init_left_out_tables_that_set_names() {

@@ -20,10 +20,11 @@ use crate::cli::values::{self, FileArgument, setting};
 
 /// Write a design and a shape to begin with
 ///
-/// Writes NAME.toml, a design, and NAME_OBJECT.toml, a shape inside its workspace. Both calibrate as
-/// they are. Every key that the program knows is in them: those that are set, and the others as
-/// comments, with unit, range, default and meaning. At a terminal, without TEMPLATE, what to begin
-/// with is asked. Files that differ are replaced only with --force.
+/// Writes NAME.toml, a design, and NAME_OBJECT.toml, a shape inside its workspace. Without --set both
+/// calibrate as they are. The design has every key of a design (`fluxform keys design`), the shape those
+/// of its primitive: keys that are set, and the others as comments, with unit, range, default and
+/// meaning. At a terminal, without TEMPLATE, what to begin with is asked. Files that differ are replaced
+/// only with --force.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Pages, &[
     ("fluxform init desk", "a small array in air, and a plate"),
@@ -85,6 +86,7 @@ impl Init {
             design,
             shape,
             array,
+            named_files,
         } = documents(&request).map_err(|refusal| match refusal {
             Refusal::Setting(message) => Failure::Usage(message),
             Refusal::Design(fault) => Failure::Documents(vec![fault]),
@@ -95,6 +97,16 @@ impl Init {
                 .map_err(RunError::from)?;
         }
         set.commit().map_err(RunError::from)?;
+        for file in named_files {
+            let path = folder.join(&file.path);
+            if !path.exists() {
+                printer.warning(&format!(
+                    "{}: {} does not exist: put it there before the design is used",
+                    file.key(),
+                    path.display()
+                ));
+            }
+        }
         let beside = |name: &str| match folder.as_os_str() == "." {
             true => PathBuf::from(name),
             false => folder.join(name),
@@ -107,7 +119,8 @@ impl Init {
             (Some(plot), Some(array)) => plot.draw(&[], &array.drawing(), printer)?,
             _ => Stream::Output,
         };
-        printer.summary(place, &written, || text(&written))
+        let json = printer.with_warnings(&written);
+        printer.summary(place, &json, || text(&written))
     }
 
     fn request(&self, start: Start, object: Object) -> Request {

@@ -9,6 +9,7 @@ use toml::{Table, Value};
 
 use crate::design::commented::commented;
 use crate::design::keys::of_designs;
+use crate::design::named_file::NamedFile;
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need};
 use crate::numerics::axis::Axis;
@@ -122,7 +123,7 @@ impl Request {
     }
 }
 
-/// A design and a shape that calibrate as they are.
+/// A design and a shape, which calibrate as they are where no key is set.
 #[derive(Debug, Clone)]
 pub struct Documents {
     /// File name and text of the design.
@@ -131,6 +132,8 @@ pub struct Documents {
     pub shape: (String, String),
     /// The array, to draw.
     pub array: Option<ArrayPlot>,
+    /// The files that the design names, not read here; paths from the design's folder.
+    pub named_files: Vec<NamedFile>,
 }
 
 /// Why there are no documents.
@@ -186,6 +189,7 @@ pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     let name = &design.name;
     Ok(Documents {
         array: drawing(&design, []),
+        named_files: design.named_files(),
         design: (
             format!("{name}.toml"),
             commented(&head, &of_designs(), &values),
