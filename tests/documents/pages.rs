@@ -71,3 +71,20 @@ pub fn command_and_output(title: &str) -> (String, String) {
         .find(|block| block.language == "text");
     (command, shown.unwrap().text.clone())
 }
+
+/// The lines without the folder that was written to and without the times of this machine; that a time is shown counts.
+pub fn lasting(text: &str) -> Vec<String> {
+    text.lines()
+        .map(str::trim_end)
+        .filter(|line| !line.trim_start().starts_with("written to"))
+        .map(
+            |line| match line.split_whitespace().collect::<Vec<_>>()[..] {
+                ["took", _, _] => "  took".to_owned(),
+                ["step", _, _, "each", "on", "this", "machine"] => {
+                    "  step each on this machine".to_owned()
+                }
+                _ => line.to_owned(),
+            },
+        )
+        .collect()
+}

@@ -8,7 +8,7 @@ use fluxform_testing::place::Place;
 use fluxform_testing::root;
 use fluxform_testing::run::program;
 
-use crate::pages::{blocks, command_and_output, page, section};
+use crate::pages::{blocks, command_and_output, lasting, page, section};
 use fluxform_testing::needs::{self, Trial};
 use fluxform_testing::trials;
 
@@ -28,14 +28,6 @@ fn printed(arguments: &[impl AsRef<std::ffi::OsStr> + std::fmt::Debug]) -> Strin
     let errors = String::from_utf8(run.stderr).unwrap();
     assert!(run.status.success(), "{arguments:?}: {errors}");
     String::from_utf8(run.stdout).unwrap()
-}
-
-/// Without the line that names the folder, and how long a step takes on this machine.
-fn lasting(text: &str) -> Vec<&str> {
-    text.lines()
-        .map(str::trim_end)
-        .filter(|line| !line.trim_start().starts_with("written to") && !line.starts_with("  step "))
-        .collect()
 }
 
 /// The arguments of a shown command, `files` of it inside `folder`.

@@ -2,7 +2,7 @@
 
 use fluxform_testing::place::Place;
 
-use crate::pages::{blocks, page, section};
+use crate::pages::{blocks, lasting, page, section};
 use fluxform_testing::needs::{self, Trial};
 use fluxform_testing::trials;
 
@@ -43,18 +43,6 @@ fn tool(script: &str) -> Option<Tool> {
     } else {
         None
     }
-}
-
-/// Without what depends on the machine or the folder.
-fn lasting(text: &str) -> Vec<&str> {
-    text.lines()
-        .map(str::trim_end)
-        .filter(|line| {
-            !["  step ", "  written to ", "  took "]
-                .iter()
-                .any(|own| line.starts_with(own))
-        })
-        .collect()
 }
 
 /// Runs the tutorial's blocks that need nothing or `with`.
