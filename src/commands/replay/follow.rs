@@ -7,10 +7,10 @@ use crate::coil::drive::Drive;
 use crate::numerics::vec3::dot;
 use crate::progress::Progress;
 
-use super::PORTION;
 use super::felt::Felt;
 use super::renderer::{Renderer, Step};
-use super::summary::Bounds;
+use super::summary::{Bounds, Followed};
+use super::{Opened, PORTION};
 
 /// While currents follow a command forces are looked at first after this share of the shortest time constant,
 const FIRST: f64 = 1.0 / 16.0;
@@ -64,31 +64,14 @@ impl Steps {
     }
 }
 
-/// What is measured along a trajectory.
-pub(super) struct Followed {
-    /// The table: a row a position, at the end of its time.
-    pub(super) rows: ReplayRows,
-    /// With currents that follow their command, times within those of the positions; else the rows are all there is.
-    pub(super) within: Option<ReplayRows>,
-    /// How long each of these counts, s.
-    pub(super) counts_s: Vec<f64>,
-}
-
-impl Followed {
-    /// The rows that errors, currents and heat are taken of.
-    pub(super) fn measured(&self) -> &ReplayRows {
-        self.within.as_ref().unwrap_or(&self.rows)
-    }
-}
-
 /// Goes through the positions again for the numbers that a runtime has no time for.
 pub(super) struct Follower {
-    pub(super) renderer: Renderer,
+    renderer: Renderer,
     /// The bundle's static currents.
-    pub(super) fixed_a: Vec<f64>,
+    fixed_a: Vec<f64>,
     pub(super) bounds: Bounds,
     /// That of the current loop, Hz, where the drivers close one.
-    pub(super) bandwidth_hz: Option<f64>,
+    bandwidth_hz: Option<f64>,
     /// Where currents are chosen for uncertainties.
     pub(super) felt: Option<Felt>,
     /// The largest force of one finger's magnet on the other's, N.
@@ -104,6 +87,24 @@ struct At<'a> {
 }
 
 impl Follower {
+    /// Of a bundle's trajectory of so many positions.
+    pub(super) fn new(
+        opened: &Opened,
+        renderer: Renderer,
+        bandwidth_hz: Option<f64>,
+        positions: usize,
+    ) -> Self {
+        let fixed = opened.bundle.currents.iter();
+        Self {
+            renderer,
+            fixed_a: fixed.map(|row| row.current_a).collect(),
+            bounds: Bounds::of(&opened.bundle),
+            bandwidth_hz,
+            felt: opened.felt(positions),
+            pushed_n: 0.0,
+        }
+    }
+
     pub(super) fn rows(
         &mut self,
         trajectory: &Trajectory,

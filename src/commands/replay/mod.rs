@@ -257,19 +257,7 @@ pub fn run(
     let dynamics = drive
         .as_ref()
         .map(|drive| DynamicsSummary::of(drive, &opened.bundle, bandwidth_hz));
-    let mut follower = Follower {
-        renderer,
-        fixed_a: opened
-            .bundle
-            .currents
-            .iter()
-            .map(|row| row.current_a)
-            .collect(),
-        bounds: summary::Bounds::of(&opened.bundle),
-        bandwidth_hz,
-        felt: opened.felt(trajectory.len()),
-        pushed_n: 0.0,
-    };
+    let mut follower = Follower::new(opened, renderer, bandwidth_hz, trajectory.len());
     let followed = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
     let pushed_n = follower.pushed_n;
     let felt = follower.felt.as_ref().and_then(Felt::summary);

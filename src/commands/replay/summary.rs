@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::Opened;
 use super::felt::FeltSummary;
-use super::follow::Followed;
 use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
@@ -198,6 +197,23 @@ impl DynamicsSummary {
             voltage_v: rendering.and_then(|rendering| rendering.voltage_v),
             bandwidth_hz,
         }
+    }
+}
+
+/// What is measured along a trajectory.
+pub(super) struct Followed {
+    /// The table: a row a position, at the end of its time.
+    pub(super) rows: ReplayRows,
+    /// With currents that follow their command, times within those of the positions; else the rows are all there is.
+    pub(super) within: Option<ReplayRows>,
+    /// How long each of these counts, s.
+    pub(super) counts_s: Vec<f64>,
+}
+
+impl Followed {
+    /// The rows that errors, currents and heat are taken of.
+    pub(super) fn measured(&self) -> &ReplayRows {
+        self.within.as_ref().unwrap_or(&self.rows)
     }
 }
 
