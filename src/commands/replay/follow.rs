@@ -9,13 +9,13 @@ use crate::progress::Progress;
 
 use super::felt::Felt;
 use super::renderer::{Renderer, Step};
-use super::summary::{Bounds, Followed};
+use super::summary::{Bounds, CurrentSums, Followed};
 use super::{Opened, PORTION};
 
 /// While currents follow a command forces are looked at first after this share of the shortest time constant,
 const FIRST: f64 = 1.0 / 16.0;
 /// then after times longer by this factor each.
-const GROWTH: f64 = 1.3;
+const GROWTH: f64 = 1.4;
 
 /// A step of one finger or two.
 pub(super) struct Steps {
@@ -69,6 +69,7 @@ pub(super) struct Follower {
     renderer: Renderer,
     /// The bundle's static currents.
     fixed_a: Vec<f64>,
+    resistance_ohm: Vec<f64>,
     pub(super) bounds: Bounds,
     /// That of the current loop, Hz, where the drivers close one.
     bandwidth_hz: Option<f64>,
@@ -98,6 +99,7 @@ impl Follower {
         Self {
             renderer,
             fixed_a: fixed.map(|row| row.current_a).collect(),
+            resistance_ohm: opened.bundle.map.runtime.resistance_ohm.clone(),
             bounds: Bounds::of(&opened.bundle),
             bandwidth_hz,
             felt: opened.felt(positions),
@@ -124,7 +126,11 @@ impl Follower {
             rows: empty(),
             within: drive.is_some().then(empty),
             counts_s: Vec::new(),
+            currents: CurrentSums::new(&self.resistance_ohm),
         };
+        // All at one time: each counts alike.
+        let timed = held_s.iter().any(|held_s| *held_s > 0.0);
+        let counts = |counts_s: f64| if timed { counts_s } else { 1.0 };
         let mut flowing = vec![0.0; coils];
         let mut again = vec![0.0; coils];
         for (row, steps) in steps.iter().enumerate() {
@@ -143,12 +149,14 @@ impl Follower {
                 if row == 0 {
                     drive.settle(command);
                 }
-                self.follow(&mut found, at, (drive, command), held_s[row]);
+                self.follow(&mut found, at, (drive, command), held_s[row], counts);
                 drive.currents(&mut flowing);
             } else {
-                found.counts_s.push(held_s[row]);
+                found.counts_s.push(counts(held_s[row]));
+                found.currents.add(&flowing, counts(held_s[row]));
             }
             self.add(&mut found.rows, at, trajectory.t_s[row], &flowing);
+            found.rows.current_a.extend(&flowing);
             self.pushed_n = self.pushed_n.max(steps.pushed_n);
             let mut answers = steps.iter().map(|step| step.answer);
             if answers.any(|answer| answer != Answer::Outside) {
@@ -178,6 +186,7 @@ impl Follower {
         at: At,
         (drive, command): (&mut Drive, &[f64]),
         held_s: f64,
+        counts: impl Fn(f64) -> f64,
     ) {
         let mut flowing = vec![0.0; command.len()];
         let [shortest_s, _] = drive.time_constants_s().unwrap_or_default();
@@ -196,7 +205,9 @@ impl Follower {
             drive.currents(&mut flowing);
             if let Some(within) = &mut found.within {
                 self.add(within, at, at.trajectory.t_s[at.row] + since_s, &flowing);
-                found.counts_s.push(0.5 * (before_s + next_s));
+                let counts_s = counts(0.5 * (before_s + next_s));
+                found.counts_s.push(counts_s);
+                found.currents.add(&flowing, counts_s);
             }
             if left_s <= 0.0 {
                 break;
@@ -215,7 +226,7 @@ impl Follower {
         }
     }
 
-    /// Adds a row at `t_s` with the currents that flow.
+    /// Adds a row at `t_s` with the forces of the currents that flow.
     fn add(&self, rows: &mut ReplayRows, at: At, t_s: f64, flowing: &[f64]) {
         let (steps, row) = (at.steps, at.row);
         rows.t_s.push(t_s);
@@ -236,6 +247,5 @@ impl Follower {
             rows.static_force_n.push(static_n[finger][2]);
             rows.answer.push(step.answer);
         }
-        rows.current_a.extend(flowing);
     }
 }

@@ -204,10 +204,63 @@ impl DynamicsSummary {
 pub(super) struct Followed {
     /// The table: a row a position, at the end of its time.
     pub(super) rows: ReplayRows,
-    /// With currents that follow their command, times within those of the positions; else the rows are all there is.
+    /// With currents that follow their command the same at times within those of the positions, but for the currents;
+    /// else the rows are all there is.
     pub(super) within: Option<ReplayRows>,
-    /// How long each of these counts, s.
+    /// How long each of these counts, s; alike where all positions are of one time.
     pub(super) counts_s: Vec<f64>,
+    pub(super) currents: CurrentSums,
+}
+
+/// Currents over the times that count.
+pub(super) struct CurrentSums {
+    resistance_ohm: Vec<f64>,
+    max_a: Vec<f64>,
+    square_a2s: Vec<f64>,
+    max_sum_a: Option<f64>,
+    heat_ws: f64,
+    max_w: f64,
+    time_s: f64,
+}
+
+impl CurrentSums {
+    pub(super) fn new(resistance_ohm: &[f64]) -> Self {
+        let none = vec![0.0; resistance_ohm.len()];
+        Self {
+            resistance_ohm: resistance_ohm.to_vec(),
+            max_a: none.clone(),
+            square_a2s: none,
+            max_sum_a: None,
+            heat_ws: 0.0,
+            max_w: 0.0,
+            time_s: 0.0,
+        }
+    }
+
+    /// Currents that flow for `counts_s`.
+    pub(super) fn add(&mut self, currents_a: &[f64], counts_s: f64) {
+        let (mut sum_a, mut heat_w) = (0.0, 0.0);
+        for (coil, current) in currents_a.iter().enumerate() {
+            let square = current * current;
+            self.max_a[coil] = self.max_a[coil].max(current.abs());
+            self.square_a2s[coil] += counts_s * square;
+            sum_a += current;
+            heat_w += self.resistance_ohm[coil] * square;
+        }
+        self.max_sum_a = Some(self.max_sum_a.map_or(sum_a, |most| most.max(sum_a)));
+        self.heat_ws += counts_s * heat_w;
+        self.max_w = self.max_w.max(heat_w);
+        self.time_s += counts_s;
+    }
+
+    fn summary(&self) -> CurrentSummary {
+        let squares = self.square_a2s.iter();
+        CurrentSummary {
+            max_a: self.max_a.clone(),
+            rms_a: squares.map(|sum| (sum / self.time_s).sqrt()).collect(),
+            max_sum_a: self.max_sum_a.unwrap_or(0.0),
+        }
+    }
 }
 
 impl Followed {
@@ -314,18 +367,10 @@ impl ReplaySummary {
             ..Trajectory::default()
         };
         let (rows, times) = (followed.measured(), Times::new(&followed.counts_s));
-        let size = |most: f64, value: f64| most.max(value.abs());
         let direction = bundle.manifest.force.as_ref().map(|force| force.direction);
         let any = |answer: Answer| times.part(rows, |finger, row| finger.answer[row] == answer);
-        let resistance_ohm = &bundle.map.runtime.resistance_ohm;
-        let heat = |currents: &[f64]| -> f64 {
-            let terms = currents.iter().zip(resistance_ohm);
-            terms.map(|(i, r)| r * i * i).sum()
-        };
-        let heats: Vec<f64> = (0..rows.len()).map(|k| heat(rows.currents_a(k))).collect();
-        let coil = |coil: usize| (0..rows.len()).map(move |k| rows.currents_a(k)[coil]);
-        let fixed: Vec<f64> = bundle.currents.iter().map(|row| row.current_a).collect();
-        let sums = (0..rows.len()).map(|k| rows.currents_a(k).iter().sum::<f64>());
+        let fixed = bundle.currents.iter().map(|row| row.current_a);
+        let fixed = fixed.zip(&bundle.map.runtime.resistance_ohm);
         Self {
             schema_version: SCHEMA_VERSION,
             fluxform_version: FLUXFORM_VERSION,
@@ -349,17 +394,11 @@ impl ReplaySummary {
                 magnets_force_n: 0.0,
                 second: ForceSummary::of(second, (&rows.t_s, &times), direction),
             }),
-            currents: CurrentSummary {
-                max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
-                rms_a: (0..rows.coils)
-                    .map(|i| times.mean(coil(i).map(|current| current * current)).sqrt())
-                    .collect(),
-                max_sum_a: sums.reduce(f64::max).unwrap_or(0.0),
-            },
+            currents: followed.currents.summary(),
             power: PowerSummary {
-                mean_w: times.mean(heats.iter().copied()),
-                max_w: heats.iter().copied().fold(0.0, f64::max),
-                static_w: heat(&fixed),
+                mean_w: followed.currents.heat_ws / followed.currents.time_s,
+                max_w: followed.currents.max_w,
+                static_w: fixed.map(|(i, ohm)| ohm * i * i).sum(),
             },
             saturated_time_fraction: any(Answer::Saturated),
             outside_time_fraction: any(Answer::Outside),
@@ -427,14 +466,9 @@ struct Times {
 
 impl Times {
     fn new(counts_s: &[f64]) -> Self {
-        let mut weights = counts_s.to_vec();
-        if weights.iter().sum::<f64>() == 0.0 {
-            // All at one time: each counts alike.
-            weights.fill(1.0);
-        }
         Self {
-            total: weights.iter().sum(),
-            weights,
+            total: counts_s.iter().sum(),
+            weights: counts_s.to_vec(),
         }
     }
 
