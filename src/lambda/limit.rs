@@ -3,7 +3,8 @@
 //! The mean over an object is an integral over its plan area, and the points are nodes of a rule for
 //! it. Where the surface ends or breaks within a cell of the grid, the corners describe it badly: finer
 //! samples of those cells take the corners' place, and the difference that they make is what these cells
-//! are off by, and is counted twice; samples of parts twice as wide say how far the samples are off.
+//! are off by, and is counted twice; samples of parts twice as wide say how far the samples are off, and halves of the
+//! cells that were drawn to stand for others how far these are.
 //! Where the samples are points themselves (graded points), that is nearly all.
 //!
 //! In the smooth cells, blocks of two by two cells that count by their corners alone, laid in each of
@@ -16,6 +17,8 @@
 //! spacing: their border counts twice. The difference from the same points by area is in the first one.
 
 use rayon::prelude::*;
+
+use fluxform_numerics::random::seed_at;
 
 use super::Criterion;
 use super::problem::{ForceProblem, ProblemError, Settings};
@@ -34,6 +37,9 @@ const SPACING_TO_ERROR: f64 = 3.0;
 pub(crate) const MARGIN: f64 = 1.6;
 /// Of the difference from samples with one quartering less, which are off twice as far and more.
 const MARGIN_OF_SAMPLES: f64 = 1.5;
+
+/// Ways to draw one of every two cells that stand for others: one or two may agree with all by luck.
+const HALVES: u64 = 6;
 
 /// Of what the cells were off by, where the samples are points: the least that is left, since a difference of
 /// samples may be small by luck.
@@ -69,6 +75,9 @@ pub struct FineSamples<'a> {
     pub areas: &'a [f64],
     /// The same with parts twice as wide; 0 for the samples that this leaves out.
     pub coarse_areas: &'a [f64],
+    /// Of each the rank of its cell among those drawn at random that stand for others, in a ratio to their number, if it
+    /// is one.
+    pub stand_in: &'a [Option<u32>],
     /// The area of each point in smooth cells alone (>= 0).
     pub point_areas: &'a [f64],
 }
@@ -132,7 +141,7 @@ pub fn limit_error(
         })?,
     };
     let of_samples = match fine {
-        Some(fine) => differs(areas, Some(fine.coarse_areas))?,
+        Some(fine) => differs(areas, Some(fine.coarse_areas))? + of_choice(areas, fine, differs)?,
         None => 0.0,
     };
     let off = (lambda_n_per_m / nearest - 1.0).abs();
@@ -141,6 +150,19 @@ pub fn limit_error(
         _ => of_cells,
     };
     Ok(off + MARGIN * of_spacing + counted + MARGIN_OF_SAMPLES * of_samples)
+}
+
+/// By how much halves of the cells that stand for others differ: as far as all of them are off, at random.
+fn of_choice(
+    areas: &[f64],
+    fine: FineSamples,
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<f64, ProblemError> + Sync,
+) -> Result<f64, ProblemError> {
+    if fine.stand_in.iter().all(Option::is_none) {
+        return Ok(0.0);
+    }
+    let halves: Vec<u64> = (0..HALVES).collect();
+    largest(&halves, |&which| differs(areas, Some(&fine.half(which))))
 }
 
 /// By how much rules of twice the spacing differ.
@@ -187,6 +209,18 @@ fn one_of(count: usize, areas: &[f64], which: usize) -> Vec<f64> {
         false => 0.0,
     };
     areas.iter().enumerate().map(weight).collect()
+}
+
+impl FineSamples<'_> {
+    /// The areas where of every two cells that stand for others one does, in the `which`-th of many ways.
+    fn half(&self, which: u64) -> Vec<f64> {
+        let area = |(area, rank): (&f64, &Option<u32>)| match rank {
+            Some(rank) if (seed_at(which, u64::from(rank / 2)) ^ u64::from(*rank)) & 1 == 0 => 0.0,
+            Some(_) => 2.0 * area,
+            None => *area,
+        };
+        self.areas.iter().zip(self.stand_in).map(area).collect()
+    }
 }
 
 impl GridPlaces<'_> {

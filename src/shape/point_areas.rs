@@ -8,7 +8,7 @@
 //!
 //! Where the surface ends or breaks within a cell, its corners alone describe it badly, and no choice
 //! among the points shows how badly. Such cells are quartered, and their quarters, until the corners do; so are
-//! those that have surface at no corner, and those over which a part rises between the corners.
+//! those that have surface at no corner, and those over which a part rises or falls between the corners.
 
 mod quarters;
 
@@ -75,6 +75,12 @@ impl Over<'_> {
         self.lattice.map_or(0.0, |lattice| lattice.rise_m(cell))
     }
 
+    /// By how much it lies below that somewhere, if by more than `by_m`, m.
+    fn fall_m(&self, cell: usize, by_m: f64) -> f64 {
+        self.lattice
+            .map_or(0.0, |lattice| lattice.fall_m(cell, by_m, self.height_m))
+    }
+
     /// All that covers a missed cell as one sample, for want of effort; none of other cells.
     fn missed_whole(&self, cell: usize) -> CellSamples {
         let whole = self.lattice.and_then(|lattice| {
@@ -107,6 +113,8 @@ pub struct FineCells {
     pub area_m2: Vec<f64>,
     /// The same with one quartering less; 0 for the samples that this leaves out.
     pub coarse_area_m2: Vec<f64>,
+    /// Of each sample the rank of its cell among those chosen to stand for others too, if it is one of them.
+    pub stand_in: Vec<Option<u32>>,
     /// Plan area that each point of the grid stands for in smooth cells alone, m^2, >= 0.
     pub point_area_m2: Vec<f64>,
 }
@@ -150,14 +158,15 @@ pub fn areas_m2(
         all.extend(left.map(|cell| (cell, surface.missed_whole(cell))));
         for (cell, samples) in all {
             fine.smooth[cell] = samples.is_empty();
-            let [of_fine, of_coarse] = thinned.scales(cell);
+            let stand_in = thinned.rank(cell);
+            let scale = stand_in.map_or(1.0, |_| thinned.scale());
             for (part, [area_m2, coarse_area_m2]) in samples {
-                let (area_m2, coarse_area_m2) = (of_fine * area_m2, of_coarse * coarse_area_m2);
                 fine.x_m.push(part.at_m[0]);
                 fine.y_m.push(part.at_m[1]);
                 fine.height_m.push(part.height_m);
-                fine.area_m2.push(area_m2);
-                fine.coarse_area_m2.push(coarse_area_m2);
+                fine.area_m2.push(scale * area_m2);
+                fine.coarse_area_m2.push(scale * coarse_area_m2);
+                fine.stand_in.push(stand_in);
             }
         }
     }
@@ -381,19 +390,15 @@ impl Thinned {
         }
     }
 
-    /// The cells of each kind that a sampled one stands for, in both rules: the coarser has every second alone.
-    fn scales(&self, cell: usize) -> [f64; 2] {
-        let Ok(rank) = self.chosen.binary_search(&cell) else {
-            return [1.0; 2];
-        };
-        let [all, chosen, second] = [
-            self.all.len(),
-            self.chosen.len(),
-            self.chosen.len().div_ceil(2),
-        ]
-        .map(|n| n as f64);
-        let of_coarse = if rank % 2 == 0 { all / second } else { 0.0 };
-        [all / chosen, of_coarse]
+    /// The rank of a cell among those that are sampled.
+    fn rank(&self, cell: usize) -> Option<u32> {
+        let found = self.chosen.binary_search(&cell).ok()?;
+        u32::try_from(found).ok()
+    }
+
+    /// The cells that a sampled one stands for.
+    fn scale(&self) -> f64 {
+        self.all.len() as f64 / self.chosen.len() as f64
     }
 }
 
@@ -416,7 +421,11 @@ fn broken_cells(
                     .map(|(axis, node)| 0.5 * (axis.node(node) + axis.node(node + 1)));
                 let off = |height: f64| ((height - mean) / mean).abs();
                 let between = surface.rise_m(cell) / mean;
-                (surface.height_m)(middle).map_or(0.0, off).max(between)
+                let departs = (surface.height_m)(middle).map_or(0.0, off).max(between);
+                match departs <= SMOOTH {
+                    true => departs.max(surface.fall_m(cell, SMOOTH * mean) / mean),
+                    false => departs,
+                }
             }
             _ => f64::INFINITY,
         }

@@ -323,3 +323,27 @@ current_max_a = [
 ]
 current_min_a = -0.5
 ";
+
+/// Samples below every point of the grid are given the height of the lowest: of a wedge that begins below the workspace
+/// lambda was off by 0.66 %, 0.43 % being stated.
+#[test]
+fn regression_heights_that_samples_below_the_grid_do_not_have_were_not_counted() {
+    let place = Place::new();
+    let text = "primitive = \"wedge\"\nlow_mm = 5\nhigh_mm = 90\nside_mm = 80\n";
+    let free = shape(&place, "wedge", text);
+    // The grid ends at the lowest edge.
+    let grid = "[points]\nx_mm = [-40, 40, 161]\ny_mm = [-40, 40, 161]\n";
+    let fine = shape(&place, "fine", &format!("{text}{grid}"));
+    let solved = |shape: &str, flags: &[&str]| {
+        let args = ["lambda", SEED, shape, "--format", "json"];
+        let run = place.run(&[&args[..], flags].concat()).ends(0).json();
+        let error = number(&run["accuracy"]["lambda_of_points"]["estimate"]);
+        (number(&run["lambda_n_per_m"]), error)
+    };
+    let (limit, left) = solved(&fine, &["--weights", "area"]);
+    for error in ["3%", "2%", "1%", "0.7%"] {
+        let (lambda, stated) = solved(&free, &["--error", error]);
+        let off = (lambda / limit - 1.0).abs();
+        assert!(off <= stated + left, "{error}: {off} of {stated}");
+    }
+}

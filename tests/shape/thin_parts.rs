@@ -112,6 +112,42 @@ fn regression_ribs_on_a_plate_between_the_points_of_a_grid_had_no_samples() {
     assert_near(above_m3, ribs_m2 * (height - plate_m), 4e-2);
 }
 
+/// Where corners and middles of cells lie on ridges, the grooves between them were taken to be as high: lambda of a grating
+/// whose period was that of the grid was a fifth too small, 4 % being stated.
+#[test]
+fn regression_grooves_between_the_points_of_a_grid_had_no_samples() {
+    let (floor_m, ridge_m) = (15e-3, 31e-3);
+    // In every cell from a tenth on, over a floor of its own or over one under everything.
+    for (width, floor_is_whole) in [(0.35, true), (0.05, false)] {
+        let edge = |k: usize, part: f64| FROM_M + (k as f64 + part) * STEP_M;
+        let over = |from_m: f64, to_m: f64, high_m: f64| {
+            block([from_m, FROM_M, 10e-3], [to_m, -FROM_M, high_m])
+        };
+        let ridge = |k: usize| {
+            let from_m = if k == 0 {
+                FROM_M
+            } else {
+                edge(k - 1, 0.1 + width)
+            };
+            let to_m = if k == 16 { -FROM_M } else { edge(k, 0.1) };
+            over(from_m, to_m, ridge_m)
+        };
+        let floor = |k: usize| over(edge(k, 0.1), edge(k, 0.1 + width), floor_m);
+        let mut faces: Vec<_> = (0..17).flat_map(ridge).collect();
+        match floor_is_whole {
+            true => faces.extend(over(FROM_M, -FROM_M, floor_m)),
+            false => faces.extend((0..16).flat_map(floor)),
+        }
+        let points = points(&Surface::Mesh(exact(faces)), FROM_M);
+        assert!(points.height_m.iter().all(|height_m| *height_m == ridge_m));
+        let [area_m2, volume_m3] = sums(&points);
+        let side_m = -2.0 * FROM_M;
+        assert_near(area_m2, side_m * side_m, 1e-9);
+        let mean_m = ridge_m - width * (ridge_m - floor_m);
+        assert_near(volume_m3 / area_m2, mean_m, 1e-2);
+    }
+}
+
 /// A rectangle no wider than the deviation, with no surface at a corner, lost what lay over it.
 #[test]
 fn regression_graded_points_lost_ribs_between_the_corners_of_patches() {

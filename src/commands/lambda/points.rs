@@ -11,7 +11,7 @@ use crate::commands::discretize::scattered::ScatteredReport;
 use crate::design::Workspace;
 use crate::force_direction::RequestedForce;
 use crate::lambda::limit::{self, FineSamples, limit_error};
-use crate::lambda::{ForceProblem, Settings, Wiring};
+use crate::lambda::{ForceProblem, ProblemError, Settings, Wiring, constant};
 use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -75,6 +75,8 @@ pub(crate) struct ForcesAt<'a> {
 
 /// The least that a point counts for, of the most.
 const LEAST: f64 = 1e-6;
+/// Samples are raised to so many times their height again, at most: some lie at the coils.
+const MOST_RAISED: f64 = 4.0;
 
 impl ForcePoints {
     /// Those of a grid, which count by `rule`. Where they count by area and nobody gave the grid, samples of the
@@ -231,8 +233,10 @@ impl ForcePoints {
             let (of_grid, graded) = problem.split_at(on_grid);
             let fine = Some(fine_samples(cells, &graded, true));
             let areas = &self.areas[..on_grid];
-            let found = limit_error(&of_grid, lambda_n_per_m, areas, grid, fine, settings);
-            return Ok(Some(found?));
+            let found = limit_error(&of_grid, lambda_n_per_m, areas, grid, fine, settings)?;
+            let raised = self.raised_again(unwired, (wiring, settings), at)?;
+            let moved = raised.map_or(0.0, |raised| (raised / lambda_n_per_m - 1.0).abs());
+            return Ok(Some(found + moved));
         }
         let places_m = cells.map_or_else(Vec::new, |fine| {
             self.sample_places_m(fine, &at.scene.design.workspace)
@@ -262,6 +266,72 @@ impl ForcePoints {
         let areas = &self.areas;
         let found = limit_error(problem, lambda_n_per_m, areas, grid, fine, settings);
         Ok(Some(found?))
+    }
+
+    /// The samples among the points that are lower than the height they are given, and that over theirs.
+    pub(super) fn raised(&self) -> Vec<(usize, f64)> {
+        let first = self.before_graded();
+        let samples = self.fine.iter().flat_map(|fine| fine.height_m.iter());
+        let raised = first.into_iter().flat_map(|first| {
+            let given = samples.clone().zip(&self.height_m[first..]).enumerate();
+            given.map(move |(sample, (own, given))| (first + sample, given / own))
+        });
+        raised.filter(|(_, by)| *by > 1.0).collect()
+    }
+
+    /// The constant where samples that are given a height above their own are as much higher again: as far off as that of
+    /// their own heights, at which no forces are computed. `None` without such samples, 0 without a constant.
+    fn raised_again(
+        &self,
+        unwired: &ForceProblem,
+        (wiring, settings): (&Wiring, &Settings),
+        at: ForcesAt,
+    ) -> Result<Option<f64>, RunError> {
+        let rows = self.raised();
+        if rows.is_empty() {
+            return Ok(None);
+        }
+        let again = |(row, by): &(usize, f64)| {
+            let [x, y, z] = self.positions_m[*row];
+            [x, y, z * by.min(MOST_RAISED)]
+        };
+        let places_m: Vec<[f64; 3]> = rows.iter().map(again).collect();
+        let field = at.field;
+        let forces_n_per_a = field.forces_n_per_a(
+            "raised samples",
+            at.scene,
+            at.solved,
+            &places_m,
+            at.progress,
+        )?;
+        let pull = match unwired.offset_n {
+            Some(_) => passive::pull(at.scene, &places_m, false)?,
+            None => None,
+        };
+        let pull_n = pull.map(|pull| pull.forces_z_n(&places_m));
+        let coils = unwired.coils();
+        let mut height_m = unwired.height_m.to_vec();
+        let mut all_n_per_a = unwired.forces_n_per_a.to_vec();
+        let mut offset_n = unwired.offset_n.map(<[f64]>::to_vec);
+        for (k, (row, _)) in rows.iter().enumerate() {
+            height_m[*row] = places_m[k][2];
+            all_n_per_a[row * coils..(row + 1) * coils]
+                .copy_from_slice(&forces_n_per_a[k * coils..(k + 1) * coils]);
+            if let (Some(offset_n), Some(pull_n)) = (&mut offset_n, &pull_n) {
+                offset_n[*row] = pull_n[k];
+            }
+        }
+        let problem = ForceProblem {
+            forces_n_per_a: &all_n_per_a,
+            height_m: &height_m,
+            offset_n: offset_n.as_deref(),
+            ..*unwired
+        };
+        let rewired = wiring.apply(&problem, at.scene.design.supply.voltage_v);
+        match constant(&rewired.problem(&problem), settings) {
+            Err(ProblemError::TooWeak { .. }) => Ok(Some(0.0)),
+            other => Ok(Some(other?.unwrap_or(0.0))),
+        }
     }
 
     /// Where the magnet is at samples: no lower than the workspace, or the lowest point below it.
@@ -312,6 +382,7 @@ fn fine_samples<'a>(
         offset_n: samples.offset_n,
         areas: &cells.area_m2,
         coarse_areas: &cells.coarse_area_m2,
+        stand_in: &cells.stand_in,
         point_areas: &cells.point_area_m2,
     }
 }

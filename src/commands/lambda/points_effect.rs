@@ -50,11 +50,16 @@ impl PosedProblem<'_> {
             relative_to: "lambda".to_owned(),
             method: format!(
                 "an estimate against the limit of ever more points: what every second point in four \
-                 ways and finer samples of broken cells change{}",
+                 ways and finer samples of broken cells change{}{}",
                 if self.problem.weights.is_some() {
                     ""
                 } else {
                     ", and what weights by area would"
+                },
+                if self.points.raised().is_empty() {
+                    ""
+                } else {
+                    ", and the heights of samples that are lower than every point, taken as the lowest"
                 }
             ),
         }))

@@ -34,6 +34,11 @@ impl Rect {
         [0, 1].map(|k| 0.5 * (self.low_m[k] + self.high_m[k]))
     }
 
+    /// The place at these parts of its sides.
+    pub(super) fn at(&self, part: Point) -> Point {
+        [0, 1].map(|k| self.low_m[k] + part[k] * (self.high_m[k] - self.low_m[k]))
+    }
+
     pub(crate) fn sides(&self) -> Point {
         [0, 1].map(|k| self.high_m[k] - self.low_m[k])
     }
@@ -375,6 +380,12 @@ impl Polygon {
 
     pub(super) fn corners(&self) -> &[Point] {
         &self.corners[..self.count]
+    }
+
+    /// The mean of its corners, which lies inside.
+    pub(super) fn middle(&self) -> Point {
+        let sum = |k: usize| self.corners().iter().map(|corner| corner[k]).sum::<f64>();
+        [0, 1].map(|k| sum(k) / self.count as f64)
     }
 
     /// Each side as its two ends.

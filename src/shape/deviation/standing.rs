@@ -4,6 +4,11 @@ use super::piece::{Patch, Point, Polygon, Rect};
 use super::union::area_m2;
 use super::{Faces, Lattice};
 
+/// Faces below a patch that are looked at, at most.
+const FLOORS: usize = 4;
+/// Places of a rectangle, as parts of its sides, that leave no quarter of either side out beside its middle.
+const PLACES: [Point; 4] = [[0.27, 0.83], [0.71, 0.36], [0.13, 0.19], [0.89, 0.61]];
+
 /// A part of the surface over a rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Standing {
@@ -17,12 +22,8 @@ impl Standing {
     /// Of the largest of `pieces`; `None` without area.
     fn of(pieces: &[Polygon], area_m2: f64) -> Option<Self> {
         let larger = |p: &&Polygon, q: &&Polygon| p.area().total_cmp(&q.area());
-        let corners = pieces.iter().max_by(larger)?.corners();
-        let sum = |k: usize| corners.iter().map(|corner| corner[k]).sum::<f64>();
-        (area_m2 > 0.0).then(|| Self {
-            at_m: [0, 1].map(|k| sum(k) / corners.len() as f64),
-            area_m2,
-        })
+        let at_m = pieces.iter().max_by(larger)?.middle();
+        (area_m2 > 0.0).then_some(Self { at_m, area_m2 })
     }
 }
 
@@ -52,6 +53,35 @@ impl Faces {
             .map(|(piece, _)| piece)
             .collect();
         Standing::of(&pieces, area_m2(&pieces))
+    }
+
+    /// By how much the surface lies below a patch, if by more than `by_m`, as far as looks at some places tell, m: the
+    /// middles of the highest faces that do so, since a floor below the surface lies lower, and some of the whole, since
+    /// faces may be larger. 0 where there is no such face, or none is seen. `height_m` is that of the surface.
+    pub(crate) fn fall_m(
+        &self,
+        (patch, among): (&Patch, &[u32]),
+        by_m: f64,
+        mut height_m: impl FnMut(Point) -> Option<f64>,
+    ) -> f64 {
+        let faces = among.iter().map(|face| &self.list[*face as usize]);
+        let middles = faces.filter_map(|face| {
+            let [_, most_m] = face.most_off_m(&patch.rect, patch, self.hair);
+            let piece = (most_m > by_m).then(|| face.within(&patch.rect))?;
+            let middle = piece.middle();
+            (piece.width() > self.hair.plan_m).then(|| (middle, face.height(middle)))
+        });
+        let mut middles: Vec<(Point, f64)> = middles.collect();
+        if middles.is_empty() {
+            return 0.0;
+        }
+        middles.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let middles = middles.iter().take(FLOORS).map(|(at, _)| *at);
+        let of_whole = PLACES.map(|part| patch.rect.at(part));
+        let falls = (middles.chain(of_whole))
+            .filter_map(|at| Some(patch.height_m(at) - height_m(at)?))
+            .find(|fall_m| *fall_m > by_m);
+        falls.unwrap_or(0.0)
     }
 
     /// The pieces of faces over a patch that surpass it by more than `by_m`, and by how much.
@@ -90,5 +120,19 @@ impl Lattice<'_> {
     pub(crate) fn rise_m(&self, cell: usize) -> f64 {
         let rise_m = |patch: Patch| self.faces.rise_m(&patch, &self.members(cell));
         self.patch(cell).map_or(0.0, rise_m)
+    }
+
+    /// [`Faces::fall_m`] over a cell of four points; 0 over others.
+    pub(crate) fn fall_m(
+        &self,
+        cell: usize,
+        by_m: f64,
+        height_m: impl FnMut(Point) -> Option<f64>,
+    ) -> f64 {
+        let fall_m = |patch: Patch| {
+            let among = self.members(cell);
+            self.faces.fall_m((&patch, &among), by_m, height_m)
+        };
+        self.patch(cell).map_or(0.0, fall_m)
     }
 }

@@ -120,6 +120,20 @@ impl Square {
     fn mean_m(&self) -> f64 {
         0.25 * self.heights_m.iter().flatten().sum::<f64>()
     }
+
+    /// By how much a smooth part departs from its corners, at most, m.
+    fn smooth_m(&self) -> f64 {
+        self.smooth * self.mean_m()
+    }
+
+    /// What lies between its corners, if all have a height.
+    fn patch(&self) -> Option<Patch> {
+        let [a, b, c, d] = self.heights_m;
+        Some(Patch {
+            rect: self.rect,
+            corners_m: [a?, b?, d?, c?],
+        })
+    }
 }
 
 /// A cell that is quartered where its corners describe the surface badly.
@@ -188,6 +202,7 @@ impl Quarters<'_> {
                 let middle = self.height_m(middle);
                 middle.is_some_and(|height| ((height - mean) / mean).abs() <= square.smooth)
                     && self.risen(&square).is_none()
+                    && !self.falls(&square)
             }
             _ => false,
         };
@@ -220,15 +235,16 @@ impl Quarters<'_> {
 
     /// What rises between the corners of a part of four, more than smooth ones do.
     fn risen(&self, square: &Square) -> Option<Standing> {
-        let [Some(a), Some(b), Some(c), Some(d)] = square.heights_m else {
-            return None;
+        (self.faces?).risen(&square.patch()?, &square.members, square.smooth_m())
+    }
+
+    /// Whether the surface falls between the corners of a part of four, more than smooth ones do.
+    fn falls(&mut self, square: &Square) -> bool {
+        let Some((faces, patch)) = self.faces.zip(square.patch()) else {
+            return false;
         };
-        let patch = Patch {
-            rect: square.rect,
-            corners_m: [a, b, d, c],
-        };
-        let by_m = square.smooth * square.mean_m();
-        self.faces?.risen(&patch, &square.members, by_m)
+        let over = (&patch, &square.members[..]);
+        faces.fall_m(over, square.smooth_m(), |place| self.look(place)) > 0.0
     }
 
     /// The lowest corner of a part, with its height; `middle` if that is lower.
