@@ -4,6 +4,7 @@ use super::Scene;
 use super::core_material::SceneCore;
 use crate::RunError;
 use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::linear_equivalent::LinearEquivalent;
 use crate::field::steel::saturated_coil::{CoilWithCurve, SaturatedCoil, SaturatedCoilError};
 
 /// The coil of `scene` at `current_a` along `curve`, to `tolerance` from `height_m` up, or as far
@@ -21,13 +22,8 @@ pub(crate) fn solve(
     tolerance: f64,
     height_m: f64,
 ) -> Result<SaturatedCoil, RunError> {
-    let coil = CoilWithCurve {
-        winding: &scene.winding,
-        air_inductance_h: scene.circuit.inductance_h,
-        shape: core.shape,
-        law: curve,
-    };
-    coil.solve(current_a, tolerance, height_m)
+    coil(scene, core, curve)
+        .solve(current_a, tolerance, height_m)
         .map_err(|error| match error {
             SaturatedCoilError::OnEdge(on_edge) => on_edge.into(),
             SaturatedCoilError::Mesh(fault) => {
@@ -35,6 +31,36 @@ pub(crate) fn solve(
             }
             SaturatedCoilError::Stalled => no_state(current_a),
         })
+}
+
+/// The linear core that is taken for the one at `state` where cores are coupled: alone it has the same gradient on
+/// the axis at the target's height.
+///
+/// # Errors
+/// A place on the winding's edge.
+pub(crate) fn linear(
+    scene: &Scene,
+    core: &SceneCore,
+    curve: &BhCurve,
+    state: &SaturatedCoil,
+) -> Result<LinearEquivalent, RunError> {
+    let first = mean_permeability(curve, state);
+    let height_m = scene.design.target_height_m;
+    Ok(coil(scene, core, curve).linear_equivalent(state, first, height_m)?)
+}
+
+/// The curve's permeability at the mean |B| of `state`.
+pub(crate) fn mean_permeability(curve: &BhCurve, state: &SaturatedCoil) -> f64 {
+    curve.relative_permeability(state.inside.mean_b_t).max(1.0)
+}
+
+fn coil<'a>(scene: &'a Scene, core: &SceneCore, curve: &'a BhCurve) -> CoilWithCurve<'a> {
+    CoilWithCurve {
+        winding: &scene.winding,
+        air_inductance_h: scene.circuit.inductance_h,
+        shape: core.shape,
+        law: curve,
+    }
 }
 
 /// The message when no state of the steel was found.

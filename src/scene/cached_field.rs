@@ -123,8 +123,9 @@ impl FieldStore {
         );
         let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
         if let Some(Described::Curve(_)) = design.core.as_ref().map(|core| &core.steel) {
-            // Along a curve the rated current counts too.
-            field = field.and(format!("{:?}", design.supply).as_bytes());
+            // Along a curve the rated current counts too, and the height at which linear cores are those of the curve.
+            let along_curve = (&design.supply, design.target_height_m);
+            field = field.and(format!("{along_curve:?}").as_bytes());
         }
         for file in &scene.files {
             field = field.and(&file.bytes);

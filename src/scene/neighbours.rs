@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::iron::middle;
 use super::knee::{FOR_CORES, above_knee};
 use super::rated::Rated;
-use super::steel::Solved;
+use super::steel::{LINEAR_CORES, Solved};
 use super::working_point::{WorkingPoint, relative_difference};
 use super::{Scene, passive, steel};
 use crate::RunError;
@@ -30,8 +30,8 @@ pub struct ArraySummary {
     pub slowest_inductance_h: f64,
     /// Five time constants of that pattern, s.
     pub settling_s: f64,
-    /// With a B-H curve: permeability of the array's linear solution, that of one coil alone at
-    /// the mean |B| of its rated current.
+    /// With a B-H curve: permeability of the array's linear solution, with which one coil alone has the
+    /// curve's gradient at the target; of cores that are not coupled the curve's at their mean |B|.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_permeability: Option<f64>,
     /// With a B-H curve: all coils at their rated currents.
@@ -192,6 +192,7 @@ fn array(
         ..scene.circuit
     };
     accuracy.insert("mutual_inductance", stage);
+    accuracy.extend(solved.linear_flux().map(|stage| (LINEAR_CORES, stage)));
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
     let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, lowest_m)? {
         Some(point) => {

@@ -309,7 +309,6 @@ impl Single {
                 stage(state.mean_error, "the mean", ALONG_CURVE),
             ),
         ]);
-        let mean_t = state.inside.mean_b_t;
         let facts = CoreSummary {
             radius_m: shape.radius_m,
             length_m: shape.length_m(),
@@ -318,7 +317,7 @@ impl Single {
             material: MaterialKind::Curve,
             peak_field_t: state.inside.peak_b_t,
             peak_at_m: [state.inside.peak_at_m.0, state.inside.peak_at_m.1],
-            mean_field_t: mean_t,
+            mean_field_t: state.inside.mean_b_t,
             knee_t: core.knee_t,
             deviation_from_linear: Some(field.dbz_dz / linear.dbz_dz - 1.0),
         };
@@ -345,7 +344,7 @@ impl Single {
             inductance_h,
             flux_linkage_wb: Some(inductance_h * current_a),
             field,
-            relative_permeability: curve.relative_permeability(mean_t).max(1.0),
+            relative_permeability: at_current::mean_permeability(curve, &state),
             core: Some(facts),
             accuracy,
             warnings,

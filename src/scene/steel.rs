@@ -9,12 +9,14 @@ use super::iron::SceneIron;
 use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
+use crate::accuracy::StageAccuracy;
 use crate::field::iron::array::{IronArray, IronPeaks};
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::array_request::{ArrayRequest, DriveCache, NoCache};
 use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
 use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::linear_equivalent::{AGAINST_THE_CURVE, LinearEquivalent};
 use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::spread::spread;
@@ -27,6 +29,13 @@ pub(crate) const EVALUATION_SHARE: f64 = 0.1;
 const FAR: f64 = 0.5;
 /// Share of the tolerance given to what is claimed of the steel's solution.
 const STEEL_SHARE: f64 = 0.45;
+
+/// The stage that states what linear cores leave of their B-H curve.
+pub(crate) const LINEAR_CORES: &str = "linear_cores";
+
+/// How the error of linear cores in the place of those along a curve is known.
+const TWO_OF_LINEAR_CORES: &str = "the difference of two resolutions of the coupled cores, which are linear: what that \
+                                   leaves of the B-H curve is stated beside it";
 
 /// Length of coupled cores, in radii, beyond which their solution is not attempted: the work grows with
 /// the length, the error faster (at 250 radii 13 CPU s for four cores to 1e-4, at 800 it is missed).
@@ -67,8 +76,13 @@ pub struct Solved {
     pub steel_error: f64,
     /// Permeability of the linear solution. With a B-H curve the cores of coils that are not
     /// coupled follow the curve at the rated current, or at the supply's where that is less; those that are coupled are
-    /// linear, of the permeability at the mean |B| of one coil alone at that current.
+    /// linear, of the permeability with which one coil alone has the curve's gradient at the target at that current.
     pub relative_permeability: f64,
+    /// The linear cores in the place of those along a curve, where they are coupled.
+    #[serde(default)]
+    linear: Option<LinearEquivalent>,
+    /// The height that it was solved from, m.
+    lowest_m: f64,
     /// The largest |B| in a core at that current, T, where it is above the steel's knee.
     #[serde(default)]
     above_knee_t: Option<f64>,
@@ -86,6 +100,8 @@ impl Solved {
             tolerance,
             steel_error: 0.0,
             relative_permeability: 1.0,
+            linear: None,
+            lowest_m: f64::NEG_INFINITY,
             above_knee_t: None,
             prepared: PreparedField::default(),
         }
@@ -95,13 +111,49 @@ impl Solved {
     #[must_use]
     pub fn above_knee(&self, scene: &Scene) -> Option<String> {
         let (peak_t, core) = self.above_knee_t.zip(scene.core.as_ref())?;
+        let linear = self.linear_cores().map_or_else(String::new, |stage| {
+            format!(
+                "; coupled cores are taken as linear: one alone is up to {:.2} % off the B-H curve, among neighbours it \
+                 may be more",
+                100.0 * stage.estimate
+            )
+        });
         Some(format!(
             "the core at {} A reaches {peak_t:.2} T, above the steel's knee at {:.2} T: forces per ampere are those \
              at that current; smaller currents give more, and forces of several do not add up: set \
-             supply.current_max_a near the currents used",
+             supply.current_max_a near the currents used{linear}",
             most_current_a(scene),
             core.knee_t
         ))
+    }
+
+    /// How far the gradients of linear cores are from those of cores along their B-H curve; `None` where none are in
+    /// their place.
+    ///
+    /// It is what the model leaves, which no tolerance changes: a stage of its own.
+    #[must_use]
+    pub fn linear_cores(&self) -> Option<StageAccuracy> {
+        Some(StageAccuracy {
+            estimate: self.linear.as_ref()?.gradient_error(self.lowest_m),
+            relative_to: "the largest |grad B| at a height".to_owned(),
+            method: AGAINST_THE_CURVE.to_owned(),
+        })
+    }
+
+    /// The same of the flux linkage.
+    #[must_use]
+    pub(super) fn linear_flux(&self) -> Option<StageAccuracy> {
+        Some(StageAccuracy {
+            estimate: self.linear.as_ref()?.flux_error,
+            relative_to: "the self inductance".to_owned(),
+            method: AGAINST_THE_CURVE.to_owned(),
+        })
+    }
+
+    /// The same solution, whose places are no lower than `lowest_m`.
+    #[must_use]
+    pub(crate) fn with_lowest(self, lowest_m: f64) -> Self {
+        Self { lowest_m, ..self }
     }
 
     /// The steel as a source.
@@ -163,6 +215,9 @@ impl Solved {
     /// How [`Solved::steel_error`] is known; `None` without steel.
     #[must_use]
     pub fn steel_method(&self) -> Option<&'static str> {
+        if self.linear.is_some() {
+            return Some(TWO_OF_LINEAR_CORES);
+        }
         self.steel().method()
     }
 
@@ -354,15 +409,18 @@ pub(super) fn solve_with(
     let Some(core) = &scene.core else {
         return Ok(Solved::in_air(tolerance));
     };
-    let at_current = state_at_current(scene, core, tolerance, lowest_m)?;
-    let relative_permeability = permeability(core, at_current.as_ref());
-    let peak_t = at_current.as_ref().map(|state| state.inside.peak_b_t);
+    let along_curve = along_curve(scene, core, tolerance, lowest_m)?;
+    let relative_permeability = permeability(core, along_curve.as_ref());
+    let peak_t = along_curve.as_ref().map(|of| of.state.inside.peak_b_t);
     let above_knee_t = peak_t.filter(|peak_t| *peak_t > core.knee_t);
+    let linear = along_curve.as_ref().and_then(|of| of.linear.clone());
     let solved = |steel, steel_error| Solved {
         steel,
         tolerance,
         steel_error,
         relative_permeability,
+        linear,
+        lowest_m,
         above_knee_t,
         prepared: PreparedField::default(),
     };
@@ -372,8 +430,8 @@ pub(super) fn solve_with(
         let steel_error = array.relative_error;
         return Ok(solved(Steel::Coupled(Box::new(array)), steel_error));
     }
-    let (alone, steel_error) = match at_current {
-        Some(state) => (
+    let (alone, steel_error) = match along_curve {
+        Some(AlongCurve { state, .. }) => (
             AloneCore {
                 layer: state.layer,
                 added_inductance_h: state.added_inductance_h,
@@ -410,34 +468,50 @@ fn most_current_a(scene: &Scene) -> f64 {
         .min(total_a.unwrap_or(f64::INFINITY))
 }
 
-/// The state of one core along its B-H curve at the largest current that a coil can have; `None` where it has none.
+/// One core along its B-H curve, alone at the largest current that a coil can have.
+struct AlongCurve {
+    state: SaturatedCoil,
+    /// What is taken for it where cores are coupled.
+    linear: Option<LinearEquivalent>,
+    relative_permeability: f64,
+}
+
+/// The core along its B-H curve; `None` where it has none, or no current.
 ///
 /// # Errors
 /// A curve along which no state is found.
-fn state_at_current(
+fn along_curve(
     scene: &Scene,
     core: &SceneCore,
     tolerance: f64,
     lowest_m: f64,
-) -> Result<Option<SaturatedCoil>, RunError> {
+) -> Result<Option<AlongCurve>, RunError> {
     let current_a = most_current_a(scene);
-    match &core.material {
-        Material::Curve(curve) if current_a > 0.0 => {
-            let aim = STEEL_SHARE * tolerance;
-            at_current::solve(scene, core, curve, current_a, aim, lowest_m).map(Some)
-        }
-        Material::Curve(_) | Material::Linear(_) => Ok(None),
-    }
+    let curve = match &core.material {
+        Material::Curve(curve) if current_a > 0.0 => curve,
+        Material::Curve(_) | Material::Linear(_) => return Ok(None),
+    };
+    let aim = STEEL_SHARE * tolerance;
+    let state = at_current::solve(scene, core, curve, current_a, aim, lowest_m)?;
+    let linear = coupled(scene.design)
+        .then(|| at_current::linear(scene, core, curve, &state))
+        .transpose()?;
+    Ok(Some(AlongCurve {
+        relative_permeability: linear.as_ref().map_or_else(
+            || at_current::mean_permeability(curve, &state),
+            |linear| linear.relative_permeability,
+        ),
+        state,
+        linear,
+    }))
 }
 
-/// The permeability of the linear solution beside a state along the curve.
-fn permeability(core: &SceneCore, at_current: Option<&SaturatedCoil>) -> f64 {
-    match (&core.material, at_current) {
-        (Material::Curve(curve), Some(state)) => {
-            curve.relative_permeability(state.inside.mean_b_t).max(1.0)
-        }
-        (Material::Curve(_) | Material::Linear(_), _) => core.relative_permeability(),
-    }
+/// The permeability of the linear solution beside a core along its curve.
+fn permeability(core: &SceneCore, along_curve: Option<&AlongCurve>) -> f64 {
+    along_curve.map_or_else(
+        || core.relative_permeability(),
+        |of| of.relative_permeability,
+    )
 }
 
 /// The coupled cores of `scene` as they are solved.
@@ -482,8 +556,8 @@ pub(super) fn in_blocks<'a>(
     let Some(core) = scene.core.as_ref().filter(|_| coupled(scene.design)) else {
         return Ok(None);
     };
-    let at_current = state_at_current(scene, core, tolerance, lowest_m)?;
-    let relative_permeability = permeability(core, at_current.as_ref());
+    let along_curve = along_curve(scene, core, tolerance, lowest_m)?;
+    let relative_permeability = permeability(core, along_curve.as_ref());
     let request = request(scene, core, relative_permeability, tolerance, lowest_m)?;
     Ok(Some(request).filter(|request| request.blocks() > 0))
 }
@@ -501,6 +575,8 @@ fn solve_iron(
         steel_error: array.relative_error,
         steel: Steel::Iron(Box::new(array)),
         relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
+        linear: None,
+        lowest_m,
         above_knee_t: None,
         prepared: PreparedField::default(),
     })

@@ -31,7 +31,7 @@ use crate::scene::core_material::Material;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::scene::steel::Solved;
+use crate::scene::steel::{LINEAR_CORES, Solved};
 use crate::units::DETECTION_THRESHOLD_N;
 
 pub(crate) mod command;
@@ -268,7 +268,8 @@ pub fn run(
         relative_to: "1 just-noticeable difference".to_owned(),
         method: "first order: the error of every coil's force at the places given".to_owned(),
     };
-    let accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
+    let mut accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
+    accuracy.extend(solved.linear_cores().map(|stage| (LINEAR_CORES, stage)));
     Ok(CompareReport {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,

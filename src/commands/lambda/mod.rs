@@ -50,7 +50,7 @@ use crate::scene::knee::{FOR_CORES, above_knee};
 use crate::scene::passive;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
-use crate::scene::steel::Solved;
+use crate::scene::steel::{LINEAR_CORES, Solved};
 use crate::shape::document::ShapeDocument;
 use crate::uncertainty::UncertaintyOverride;
 use crate::units::FAINT_FORCE_N;
@@ -585,6 +585,9 @@ impl PosedProblem<'_> {
             warnings.extend(warning.map(|warning| format!("--at: {warning}")));
         }
         file.accuracy.extend(self.points.stages());
+        let linear = self.solved.linear_cores();
+        file.accuracy
+            .extend(linear.map(|stage| (LINEAR_CORES.to_owned(), stage)));
         let effects = [
             ("lambda_of_points", self.effect_of_number(&file, progress)?),
             ("lambda_of_heights", self.effect_of_heights(progress)?),

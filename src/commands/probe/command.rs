@@ -28,6 +28,7 @@ use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::field::components::Components;
 use crate::scene::cost::{of_probe, of_steel};
+use crate::scene::steel::LINEAR_CORES;
 
 /// How every table of points begins.
 const HEADER: &str = "x_m,y_m,z_m,coil,";
@@ -223,7 +224,9 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
         let how = "difference from the next coarser panels at up to 24 of the points, also beside and below the array";
         ("iron_at_points", stage(estimate, to, how))
     });
-    let all = [Some(("field", field)), iron, force];
+    let linear = table.linear_cores.clone();
+    let linear = linear.map(|stage| (LINEAR_CORES, stage));
+    let all = [Some(("field", field)), iron, force, linear];
     all.into_iter().flatten().collect()
 }
 

@@ -43,6 +43,8 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// With steel of any shape the largest difference of B from a coarser solution at some of the points, relative to |B|.
     pub iron_difference: Option<f64>,
+    /// What linear cores leave of their B-H curve, where coupled ones have one.
+    pub linear_cores: Option<StageAccuracy>,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
     /// How it is known.
@@ -91,9 +93,7 @@ pub fn probe(
     progress: &dyn Progress,
 ) -> Result<ProbeTable, RunError> {
     let scene = Scene::with_tolerance(design, request.tolerance)?;
-    // A value depends on its own point alone: neither the solution nor how it is evaluated may
-    // depend on where the other points are.
-    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
+    let solved = solve_anywhere(&scene, points_m.iter().map(|p| p[2]))?;
     let groups = groups(&scene, &points_m)?;
     progress.begin("probe", points_m.len() as u64);
     let coils = scene.coils.len();
@@ -158,11 +158,24 @@ pub fn probe(
         method: solved.point_method(),
         relative_to_height: solved.has_steel(),
         iron_difference,
+        linear_cores: solved.linear_cores(),
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
         warnings: solved.above_knee(&scene).into_iter().collect(),
         accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
     })
+}
+
+/// The steel of `scene` for points at `heights_m`.
+///
+/// A value depends on its own point alone: neither the solution nor how it is evaluated may depend on where
+/// the other points are. What is stated of them all may.
+///
+/// # Errors
+/// As [`steel::solve`].
+fn solve_anywhere(scene: &Scene, heights_m: impl Iterator<Item = f64>) -> Result<Solved, RunError> {
+    let solved = steel::solve(scene, scene.tolerances.field, f64::NEG_INFINITY)?;
+    Ok(solved.with_lowest(heights_m.fold(f64::INFINITY, f64::min)))
 }
 
 /// The error of the field.

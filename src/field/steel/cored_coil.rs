@@ -342,7 +342,7 @@ impl CoredCoil {
         let w = operators(&outline, 1, resolution.quadrature).remove(0);
         let potentials: Vec<DVector<f64>> =
             excitations.iter().map(|e| e.potential.clone()).collect();
-        let densities = solve(&outline, w, relative_permeability, &potentials);
+        let densities = densities(&outline, w, relative_permeability, &potentials);
         let coils = windings.iter().zip(&excitations).zip(densities);
         Ok(coils
             .map(|((winding, excitation), density)| {
@@ -373,7 +373,7 @@ impl CoredCoil {
 }
 
 /// v on the nodes for each potential, mean zero.
-fn solve(
+pub(super) fn densities(
     outline: &Generatrix,
     w: DMatrix<f64>,
     relative_permeability: f64,

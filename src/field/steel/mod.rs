@@ -21,6 +21,7 @@ pub mod equivalent_dipoles;
 pub mod exchange;
 pub mod generatrix;
 pub mod layer_gradient;
+pub mod linear_equivalent;
 pub mod lobatto;
 pub mod magnetized;
 mod offsets;

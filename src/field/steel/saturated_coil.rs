@@ -80,7 +80,7 @@ impl CoilWithCurve<'_> {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<SaturatedCoil, SaturatedCoilError> {
-        let lowest_m = lowest_m.max(self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m);
+        let lowest_m = lowest_m.max(self.closest_m());
         let problem = AtCurrent {
             coil: self,
             current_a,
@@ -134,6 +134,11 @@ impl CoilWithCurve<'_> {
         })
     }
 
+    /// The least height at which errors are estimated, m.
+    pub(super) fn closest_m(&self) -> f64 {
+        self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m
+    }
+
     /// Largest difference of the gradients at a few heights from `lowest_m` up, relative to the
     /// largest |grad B| at each, and of the flux linkages.
     ///
@@ -145,24 +150,40 @@ impl CoilWithCurve<'_> {
         b: &SaturatedCoil,
         lowest_m: f64,
     ) -> Result<f64, OnEdge> {
-        let radius_m = self.shape.radius_m;
-        let mut worst = (a.added_inductance_h - b.added_inductance_h).abs()
-            / (self.air_inductance_h + a.added_inductance_h).abs();
+        let mut worst = self.flux_difference(a.added_inductance_h, b.added_inductance_h);
         for height in [0.0, 1.0, 4.0] {
-            let z_m = lowest_m + height * radius_m;
-            let (mut size, mut differs) = (0.0_f64, 0.0_f64);
-            for across in [0.0, 0.8, 1.7] {
-                let r_m = across * radius_m;
-                let (f, g) = (a.layer.field(r_m, z_m), b.layer.field(r_m, z_m));
-                size = size.max((self.winding.field(r_m, z_m)? + f).gradient_norm());
-                differs = differs
-                    .max((f.dbz_dz - g.dbz_dz).abs())
-                    .max((f.dbr_dz - g.dbr_dz).abs())
-                    .max((f.br_over_r - g.br_over_r).abs());
-            }
-            worst = worst.max(differs / size);
+            let z_m = lowest_m + height * self.shape.radius_m;
+            let differs = self.gradient_difference(&a.layer, &b.layer, z_m, &[0.0, 0.8, 1.7])?;
+            worst = worst.max(differs);
         }
         Ok(worst)
+    }
+
+    /// Difference of the flux linkages of two cores by their parts of the inductance, relative.
+    pub(super) fn flux_difference(&self, added_h: f64, other_added_h: f64) -> f64 {
+        (added_h - other_added_h).abs() / (self.air_inductance_h + added_h).abs()
+    }
+
+    /// Largest difference of the gradients at the height `z_m` and distances `across` from the axis, in radii,
+    /// relative to the largest |grad B| there.
+    pub(super) fn gradient_difference(
+        &self,
+        a: &MagnetizedCore,
+        b: &MagnetizedCore,
+        z_m: f64,
+        across: &[f64],
+    ) -> Result<f64, OnEdge> {
+        let (mut size, mut differs) = (0.0_f64, 0.0_f64);
+        for across in across {
+            let r_m = across * self.shape.radius_m;
+            let (f, g) = (a.field(r_m, z_m), b.field(r_m, z_m));
+            size = size.max((self.winding.field(r_m, z_m)? + f).gradient_norm());
+            differs = differs
+                .max((f.dbz_dz - g.dbz_dz).abs())
+                .max((f.dbr_dz - g.dbr_dz).abs())
+                .max((f.br_over_r - g.br_over_r).abs());
+        }
+        Ok(differs / size)
     }
 }
 

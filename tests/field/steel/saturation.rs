@@ -4,6 +4,7 @@ use super::claims::{covered, random_cores};
 use super::support::{Design, SEED_COIL, SEED_CORE};
 use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::saturated_coil::CoilWithCurve;
 use fluxform_testing::Random;
@@ -144,4 +145,58 @@ fn claims_hold_along_curves() {
 #[ignore = "minutes of CPU: 42 states of the steel"]
 fn claims_hold_along_curves_in_full() {
     study(&cases(random_of_study(SEED), 36), [1e-4]);
+}
+
+/// The linear core in the place of one along a curve: another solver has its gradient, and what is left of the curve's
+/// is stated.
+#[test]
+fn the_linear_core_of_a_curve_has_its_gradient_at_one_height() {
+    const TARGET_M: f64 = 0.03;
+    let curve = &curves()[0];
+    let coil = CoilWithCurve {
+        winding: &SEED_COIL,
+        air_inductance_h: self_inductance_h(&SEED_COIL),
+        shape: SEED_CORE,
+        law: curve,
+    };
+    for current_a in [1.0, 6.0, 20.0] {
+        let state = coil.solve(current_a, 1e-4, 0.0).expect("a state");
+        let first = curve.relative_permeability(state.inside.mean_b_t);
+        let linear = |first: f64| {
+            coil.linear_equivalent(&state, first, TARGET_M)
+                .expect("above the winding")
+        };
+        let found = linear(first);
+        let mu_r = found.relative_permeability;
+        let again = linear(20.0 * first).relative_permeability;
+        assert!((again / mu_r - 1.0).abs() < 1e-3, "{mu_r} {again}");
+        let core = CoredCoil::new(&SEED_COIL, SEED_CORE, mu_r, 1e-6, 0.001).expect("above");
+        // The largest difference at a height, relative to the largest gradient there.
+        let off = |across_m: &[f64], z_m: f64| {
+            let (mut size, mut most) = (0.0_f64, 0.0_f64);
+            for r_m in across_m {
+                let air = SEED_COIL.field(*r_m, z_m).expect("above");
+                let along = air + state.layer.field(*r_m, z_m);
+                let linear = core.field(*r_m, z_m).expect("above");
+                size = size.max(along.gradient_norm());
+                most = most.max((along.dbz_dz - linear.dbz_dz).abs());
+                most = most.max((along.dbr_dz - linear.dbr_dz).abs());
+            }
+            most / size
+        };
+        let at_target = off(&[0.0], TARGET_M);
+        assert!(at_target < 1e-5, "{current_a} A: {at_target:e}");
+        for z_m in [0.002, 0.004, 0.013, 0.03, 0.06, 0.2] {
+            let worst = off(&[0.0, 0.004, 0.009, 0.012, 0.018], z_m);
+            let stated = found.gradient_error(z_m);
+            assert!(
+                worst <= stated,
+                "{current_a} A, {z_m} m: {worst:e} {stated:e}"
+            );
+        }
+        assert!(found.gradient_error(0.01) < found.gradient_error(0.0));
+        let flux = (core.added_inductance_h - state.added_inductance_h).abs();
+        let flux = flux / (coil.air_inductance_h + state.added_inductance_h);
+        assert!(flux <= found.flux_error, "{flux:e} {}", found.flux_error);
+    }
 }

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use super::solve_anywhere;
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -18,8 +19,7 @@ use crate::numerics::least_squares::CUTOFF;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
-use crate::scene::steel;
-use crate::scene::steel::Solved;
+use crate::scene::steel::{LINEAR_CORES, Solved};
 
 pub(crate) mod command;
 mod explain;
@@ -118,9 +118,9 @@ pub fn compare(
     if let Some(hint) = units::coordinates(design, &scan.positions_m) {
         return Err(refused(hint));
     }
-    // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
-    // again to the last digits.
-    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
+    // As `probe` does: a fit moves the places, and what `probe` printed must be found again to the last
+    // digits.
+    let solved = solve_anywhere(&scene, scan.positions_m.iter().map(|p| p[2]))?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
@@ -172,7 +172,7 @@ pub fn compare(
         fit: fit_file(design, &parameters, &noisy, scan, &mut warnings),
         explanations,
         best_explanation,
-        accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
+        accuracy: accuracy(&solved, relative_error),
     };
     let predicted = weighted.predicted;
     Ok(ScanReport::new(
@@ -278,12 +278,17 @@ fn rms(scan: &Scan, values: &[f64], kind: Kind) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
-    StageAccuracy {
+fn accuracy(solved: &Solved, estimate: f64) -> BTreeMap<String, StageAccuracy> {
+    let field = StageAccuracy {
         estimate,
         relative_to: "the largest field and gradient of the scan".to_owned(),
         method: solved.point_method(),
-    }
+    };
+    let linear = solved.linear_cores();
+    let all = [("field", field)].into_iter();
+    all.chain(linear.map(|stage| (LINEAR_CORES, stage)))
+        .map(|(name, stage)| (name.to_owned(), stage))
+        .collect()
 }
 
 /// Errors claimed of the computed field and gradient.
