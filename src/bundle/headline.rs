@@ -8,6 +8,8 @@ use strum::{EnumMessage, IntoStaticStr};
 use fluxform_base::digits::with_error;
 use fluxform_base::uncertainty::Cause;
 pub use fluxform_lambda::GivenForce;
+use fluxform_lambda::all_points::AllPoints;
+use fluxform_lambda::sampling::share_and_error;
 use fluxform_lambda::uncertainty::{Shares, Study};
 
 /// A part of the computation that adds an error. Its name in artefacts is the variant's in snake
@@ -226,14 +228,18 @@ const NOT_MODELLED: [&str; 6] = [
 ];
 
 impl FeltForce {
-    /// Of currents whose errors without any uncertainty are given with those of their sampling, and with those of
-    /// `study`. `pull_share` is that of the unpowered steel's sideways pull, where its upward one counts.
+    /// Of all points without any uncertainty, or with those of `study`. `pull_share` is that of the unpowered steel's
+    /// sideways pull, where its upward one counts.
     #[must_use]
-    pub fn new(
-        (exact, sampling): (FeltShares, FeltShares),
-        study: Option<&Study>,
-        pull_share: Option<f64>,
-    ) -> Self {
+    pub fn new(all: &AllPoints, study: Option<&Study>, pull_share: Option<f64>) -> Self {
+        let [(fixed, fixed_off), (feedback, feedback_off)] =
+            [&all.fixed, &all.feedback].map(|of| share_and_error(&of.squares));
+        let of = |fixed, feedback| FeltShares {
+            fixed,
+            feedback,
+            robust: None,
+        };
+        let (exact, sampling) = (of(fixed, feedback), of(fixed_off, feedback_off));
         let promised = |study: &Study| FeltShares {
             fixed: study.fixed.promised.expected,
             feedback: study.feedback.promised.expected,

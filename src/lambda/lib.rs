@@ -48,6 +48,7 @@
 //! # }
 //! ```
 
+pub mod all_points;
 mod allocation;
 mod basis;
 mod certificate;

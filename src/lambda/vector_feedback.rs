@@ -22,6 +22,7 @@ use super::allocation::{Allocator, Reach};
 use super::certificate::best_within_limits;
 use super::feedback::{FeedbackError, Reachable};
 use super::problem::{ForceProblem, Settings};
+use super::sampling::{QUARTERS, Squares};
 use super::sideways::SIDEWAYS_WEIGHT;
 use super::vector_allocation::{EvenAxes, VectorAllocator};
 
@@ -57,6 +58,17 @@ pub enum CurrentsOf<'a> {
     Upward,
     /// Of least power for all three components.
     Vector,
+}
+
+/// How far the forces of currents are off at the points of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuarterErrors {
+    /// By quarters, N^2.
+    pub squares: [Squares; QUARTERS],
+    /// The longest difference from a requested vector, N.
+    pub worst_n: f64,
+    /// Mean power in the coils, W.
+    pub mean_power_w: f64,
 }
 
 /// How well given currents render requested vectors; means by the points' weights.
@@ -327,22 +339,43 @@ pub fn render_vectors(
     currents_of: CurrentsOf,
 ) -> Result<VectorRendering, FeedbackError> {
     let all: Vec<usize> = (0..problem.upward.height_m.len()).collect();
-    render_vectors_at(problem, &all, lambda_n_per_m, currents_of)
+    Ok(sums_at(problem, &all, lambda_n_per_m, currents_of)?.rendering())
 }
 
-/// [`render_vectors`] of some points.
-///
-/// # Errors
-/// Where the problem is malformed.
-///
-/// # Panics
-/// As [`render_vectors`], and for a point that the problem does not have.
-pub fn render_vectors_at(
+/// The errors of the rendered points, whose `quarters` are given.
+pub(crate) fn quarter_errors(
+    problem: &VectorProblem,
+    quarters: &[usize],
+    lambda_n_per_m: f64,
+    currents_of: CurrentsOf,
+) -> Result<QuarterErrors, FeedbackError> {
+    let mut squares = [Squares::default(); QUARTERS];
+    let mut all = Sums::default();
+    for (quarter, squares) in squares.iter_mut().enumerate() {
+        let mine = |point: &usize| quarters[*point] == quarter;
+        let points: Vec<usize> = (0..quarters.len()).filter(mine).collect();
+        let sums = sums_at(problem, &points, lambda_n_per_m, currents_of)?;
+        *squares = Squares {
+            upward: sums.upward,
+            sideways: sums.sideways,
+            requested: sums.requested,
+        };
+        all.join(sums);
+    }
+    Ok(QuarterErrors {
+        squares,
+        worst_n: all.worst,
+        mean_power_w: all.power / all.weight,
+    })
+}
+
+/// The sums of some points.
+fn sums_at(
     problem: &VectorProblem,
     points: &[usize],
     lambda_n_per_m: f64,
     currents_of: CurrentsOf,
-) -> Result<VectorRendering, FeedbackError> {
+) -> Result<Sums, FeedbackError> {
     let vector = problem.allocator(SIDEWAYS_WEIGHT)?;
     let limits = &problem.upward;
     let heaviest = limits.heaviest();
@@ -377,7 +410,7 @@ pub fn render_vectors_at(
     for part in parts {
         all.join(part);
     }
-    Ok(all.rendering())
+    Ok(all)
 }
 
 /// Chooses the currents of a point.
@@ -419,7 +452,7 @@ struct Sums {
     heaviest: f64,
     weight: f64,
     requested: f64,
-    error: f64,
+    upward: f64,
     sideways: f64,
     worst: f64,
     reached: f64,
@@ -446,7 +479,7 @@ impl Sums {
         let sideways = x * x + y * y;
         self.weight += weight;
         self.requested += weight * request.iter().map(|part| part * part).sum::<f64>();
-        self.error += weight * (sideways + z * z);
+        self.upward += weight * z * z;
         self.sideways += weight * sideways;
         self.worst = self.worst.max((sideways + z * z).sqrt());
         self.reached += if reach == Reach::Reached { weight } else { 0.0 };
@@ -463,7 +496,7 @@ impl Sums {
     fn join(&mut self, next: Self) {
         self.weight += next.weight;
         self.requested += next.requested;
-        self.error += next.error;
+        self.upward += next.upward;
         self.sideways += next.sideways;
         self.worst = self.worst.max(next.worst);
         self.reached += next.reached;
@@ -486,10 +519,11 @@ impl Sums {
                 0.0
             }
         };
+        let error = self.upward + self.sideways;
         VectorRendering {
-            rms_error_n: (self.error / self.weight).sqrt(),
+            rms_error_n: (error / self.weight).sqrt(),
             worst_error_n: self.worst,
-            error_share: share(self.error),
+            error_share: share(error),
             sideways_share: share(self.sideways),
             direction_median_deg: quantile(0.5),
             direction_95_deg: quantile(0.95),

@@ -3,10 +3,12 @@
 
 use fluxform_base::uncertainty::{Cause, Uncertainty};
 use fluxform_lambda::ForceProblem;
+use fluxform_lambda::all_points::AllPoints;
 use fluxform_lambda::sampling::quarters;
 use fluxform_lambda::uncertainty::{
     Drawn, Study, Surroundings, Turned, displacements_m, draws, robust_currents, study,
 };
+use fluxform_lambda::vector_feedback::VectorProblem;
 use fluxform_numerics::random::Random;
 use nalgebra::{DMatrix, DVector};
 
@@ -293,6 +295,16 @@ fn of_places(
     vector: bool,
     cap_w: Option<f64>,
 ) -> Study {
+    of_some(positions, positions, given, (vector, cap_w))
+}
+
+/// Looked at at `positions`, which are some of `all`.
+fn of_some(
+    all: &[[f64; 3]],
+    positions: &[[f64; 3]],
+    given: &Uncertainty,
+    (vector, cap_w): (bool, Option<f64>),
+) -> Study {
     let heights: Vec<f64> = positions.iter().map(|place| place[2]).collect();
     let around = displacements_m(given);
     let moved = |place: [f64; 3], by: [f64; 3]| std::array::from_fn(|axis| place[axis] + by[axis]);
@@ -322,7 +334,22 @@ fn of_places(
         pull_n: None,
     };
     let fixed = [0.5, 0.4, 0.6, 0.5, 0.3];
-    let found = study(&surroundings, 0.9, &fixed, (given, cap_w), &drawn);
+    let of_all: Vec<Turned> = all.iter().flat_map(|place| forces(*place)).collect();
+    let along =
+        [0, 1, 2].map(|axis| -> Vec<f64> { of_all.iter().map(|turned| turned[axis]).collect() });
+    let heights_of_all: Vec<f64> = all.iter().map(|place| place[2]).collect();
+    let vectors = VectorProblem {
+        upward: ForceProblem {
+            forces_n_per_a: &along[2],
+            height_m: &heights_of_all,
+            ..LIMITS
+        },
+        sides_n_per_a: [&along[0], &along[1]],
+        direction: &vec![[0.0, 0.0, 1.0]; all.len()],
+    };
+    let quarters_of_all = quarters(&(0..all.len()).collect::<Vec<_>>(), None);
+    let all = AllPoints::new(vectors, &quarters_of_all, (0.9, &fixed), vector).expect("sound");
+    let found = study(&surroundings, &all, (given, cap_w), &drawn);
     found.expect("sound").expect("a force is requested")
 }
 
@@ -390,6 +417,53 @@ fn no_random_display_is_worse_than_the_worst_promised() {
                 "{k}: {error:?}"
             );
         }
+    }
+}
+
+/// Broke: of a surface with a low strip that a few points are in, the errors were those of the points looked at.
+#[test]
+fn a_strip_that_few_points_are_in_counts_as_at_all_points() {
+    let steep = |count: usize| -> Vec<[f64; 3]> {
+        let place = |k: usize| {
+            let [x, y] = [k % count, k / count].map(|of| (of as f64 + 0.5) / count as f64);
+            [0.08 * x - 0.04, 0.08 * y - 0.04, 0.004 + 0.06 * x * x]
+        };
+        (0..count * count).map(place).collect()
+    };
+    let many = steep(28);
+    let some: Vec<[f64; 3]> = many.iter().copied().step_by(19).collect();
+    for given in [ALL.only(Cause::Tilt), ALL.only(Cause::Sensor), ALL] {
+        let truth = of_places(&many, &given, false, None);
+        let found = of_some(&many, &some, &given, (false, None));
+        let off = found.sampling.expect("some points are looked at");
+        for (name, [truth, found], exact, off) in [
+            (
+                "static",
+                [truth.fixed, found.fixed],
+                [truth.exact.fixed, found.exact.fixed],
+                off.fixed,
+            ),
+            (
+                "feedback",
+                [truth.feedback, found.feedback],
+                [truth.exact.feedback, found.exact.feedback],
+                off.feedback,
+            ),
+        ] {
+            assert!((exact[0] - exact[1]).abs() < 1e-9, "{name}: {exact:?}");
+            let by = found.promised.expected - truth.promised.expected;
+            assert!(by.abs() < off, "{name}: off by {by}, stated {off}");
+            let power = found.promised.mean_power_w / truth.promised.mean_power_w;
+            assert!((power - 1.0).abs() < 1e-9, "{name}: {power}");
+            let parts = found.promised.vertical.hypot(found.promised.sideways);
+            assert!((parts / found.promised.expected - 1.0).abs() < 1e-12);
+            // A few displays next to a coil decide those drawn.
+            let realised = found.realised.expected / found.promised.expected;
+            assert!((realised - 1.0).abs() < 0.2, "{name}: {realised}");
+        }
+        let robust = found.robust.error.promised.expected;
+        let by = robust - truth.robust.error.promised.expected;
+        assert!(by.abs() < off.robust, "{by} {}", off.robust);
     }
 }
 

@@ -381,7 +381,7 @@ fn largest_given(
     }
 }
 
-fn render_error(error: FeedbackError) -> RunError {
+pub(super) fn render_error(error: FeedbackError) -> RunError {
     match error {
         FeedbackError::Problem(problem) => problem.into(),
         FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),

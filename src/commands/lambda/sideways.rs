@@ -4,14 +4,13 @@
 use rayon::prelude::*;
 
 use crate::RunError;
-use crate::bundle::headline::{FeltForce, FeltShares};
+use crate::bundle::headline::FeltForce;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::force_direction::RequestedForce;
 use crate::lambda::ForceProblem;
-use crate::lambda::feedback::FeedbackError;
-use crate::lambda::sampling::{QUARTERS, Squares, share_and_error};
+use crate::lambda::all_points::AllPoints;
 use crate::lambda::sideways::{Sideways, sideways};
-use crate::lambda::vector_feedback::{CurrentsOf, VectorProblem, render_vectors_at};
+use crate::lambda::vector_feedback::VectorProblem;
 use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -20,8 +19,9 @@ use crate::scene::passive::{self, Pull};
 use crate::scene::steel::Solved;
 
 use super::LambdaOptions;
+use super::feedback::render_error;
 use super::points::ForcePoints;
-use super::uncertain::{self, Chosen};
+use super::uncertain::{Chosen, study_of};
 
 /// Forces per ampere along each axis at the points looked at, at most: their memory and time.
 const NUMBERS: usize = 400_000;
@@ -45,7 +45,6 @@ pub(crate) fn add(
     (options, force): (&LambdaOptions, RequestedForce),
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
-    uncertain::add(file, scene, solved, points, (options, force), progress)?;
     let (Some(currents_a), Some(lambda)) = (&file.currents_a, file.lambda_n_per_m) else {
         return Ok(());
     };
@@ -82,66 +81,24 @@ pub(crate) fn add(
         sides_n_per_a: sides,
         direction: &direction,
     };
-    let followed = if force.direction.is_vector() {
-        CurrentsOf::Vector
-    } else {
-        CurrentsOf::Upward
-    };
-    let all: Vec<usize> = (0..positions_m.len()).collect();
-    let some = spread(all.len(), MOST_FOLLOWED);
     let quarters = chosen.quarters(points);
-    let felt = |of| felt_share(&vectors, &quarters, lambda, of);
-    let found = sideways(&of_z, sides, lambda, currents_a, &some).and_then(|sideways| {
-        let (fixed, fixed_off) = felt(CurrentsOf::Static(currents_a))?;
-        let (feedback, feedback_off) = felt(followed)?;
-        let of = |fixed, feedback| FeltShares {
-            fixed,
-            feedback,
-            robust: None,
-        };
-        Ok((sideways, of(fixed, feedback), of(fixed_off, feedback_off)))
-    });
-    let (sideways, exact, sampling) = found.map_err(|error| match error {
-        FeedbackError::Problem(problem) => RunError::from(problem),
-        FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),
-    })?;
+    let some = spread(positions_m.len(), MOST_FOLLOWED);
+    let sideways = sideways(&of_z, sides, lambda, currents_a, &some).map_err(render_error)?;
+    let vector = force.direction.is_vector();
+    let all = AllPoints::new(vectors, &quarters, (lambda, currents_a), vector);
+    let all = all.map_err(render_error)?;
+    let study = study_of(&all, (scene, solved), points, (options, force), progress)?;
     let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
+    let felt = FeltForce::new(&all, study.as_ref(), pull_share);
+    if let Some(headline) = &mut file.headline {
+        headline.add_felt(felt);
+    }
+    file.uncertainty = study;
     file.sideways = sideways.map(|found| Sideways {
         pull_share,
         ..found
     });
-    if let Some(headline) = &mut file.headline {
-        let study = file.uncertainty.as_ref();
-        headline.add_felt(FeltForce::new((exact, sampling), study, pull_share));
-    }
     Ok(())
-}
-
-/// The error of the vector relative to the requested one, and by how much that may be off, being that of some points.
-fn felt_share(
-    problem: &VectorProblem,
-    quarters: &[usize],
-    lambda_n_per_m: f64,
-    of: CurrentsOf,
-) -> Result<(f64, f64), FeedbackError> {
-    let mut sums = [Squares::default(); QUARTERS];
-    for (quarter, sums) in sums.iter_mut().enumerate() {
-        let mine = |point: &usize| quarters[*point] == quarter;
-        let points: Vec<usize> = (0..quarters.len()).filter(mine).collect();
-        if points.is_empty() {
-            continue;
-        }
-        let rendered = render_vectors_at(problem, &points, lambda_n_per_m, of)?;
-        let square = |point: &usize| {
-            let limits = &problem.upward;
-            let request = problem.direction[*point].map(|part| part * limits.height_m[*point]);
-            limits.weights.map_or(1.0, |all| all[*point])
-                * request.iter().map(|part| part * part).sum::<f64>()
-        };
-        sums.requested = points.iter().map(square).sum();
-        sums.error = sums.requested * rendered.error_share.powi(2);
-    }
-    Ok(share_and_error(&sums))
 }
 
 /// The steel's sideways pull, root mean square over that of the requested force, to about a tenth of itself: of some

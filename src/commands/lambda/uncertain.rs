@@ -1,12 +1,12 @@
 //! The felt error under what is uncertain of the display in use, and currents chosen for it.
 
 use crate::RunError;
-use crate::bundle::lambda_file::LambdaFile;
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
+use crate::lambda::all_points::AllPoints;
 use crate::lambda::sampling::quarters;
 use crate::lambda::uncertainty::{
-    Draw, Drawn, StudyError, Surroundings, Turned, displacements_m, draws, most_points, study,
+    Draw, Drawn, Study, Surroundings, Turned, displacements_m, draws, most_points, study,
 };
 use crate::lambda::{ForceProblem, Wiring};
 use crate::numerics::spread::spread;
@@ -17,6 +17,7 @@ use crate::scene::steel::Solved;
 use crate::uncertainty::Uncertainty;
 
 use super::LambdaOptions;
+use super::feedback::render_error;
 use super::points::ForcePoints;
 
 /// Random displays.
@@ -36,25 +37,20 @@ pub(crate) fn check(options: &LambdaOptions, design: &Design) -> Result<(), RunE
     Ok(())
 }
 
-/// Adds the study to `file`, if anything is uncertain and there are currents.
+/// The study of some of the points with what is known of `all`; `None` where nothing is uncertain or requested.
 ///
 /// # Errors
 /// Bounds beyond the array; places that cannot be computed; interruption.
-pub(crate) fn add(
-    file: &mut LambdaFile,
-    scene: &Scene,
-    solved: &Solved,
+pub(super) fn study_of(
+    all: &AllPoints,
+    (scene, solved): (&Scene, &Solved),
     points: &ForcePoints,
     (options, force): (&LambdaOptions, RequestedForce),
     progress: &dyn Progress,
-) -> Result<(), RunError> {
+) -> Result<Option<Study>, RunError> {
     let given = options.uncertainty.over(scene.design.uncertainty);
-    let lambda = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0);
-    let (Some(static_a), Some(lambda)) = (&file.currents_a, lambda) else {
-        return Ok(());
-    };
-    if given.is_none() {
-        return Ok(());
+    if given.is_none() || all.lambda_n_per_m <= 0.0 {
+        return Ok(None);
     }
     let coils = scene.coils.len();
     let chosen = Chosen::new(points, most_points(coils));
@@ -101,20 +97,16 @@ pub(crate) fn add(
     };
     progress.begin("uncertainty", 1);
     let cap_w = options.uncertainty.power_cap_w;
-    let found = study(&surroundings, lambda, static_a, (&given, cap_w), &drawn);
-    let mut found = found.map_err(|error| match error {
-        StudyError::Problem(problem) => RunError::from(problem),
-        StudyError::Allocator(limits) => RunError::Input(limits.to_string()),
-    })?;
+    let found = study(&surroundings, all, (&given, cap_w), &drawn);
+    let mut found = found.map_err(render_error)?;
     let currents = found
         .as_mut()
         .and_then(|found| found.robust_static.currents_a.as_mut());
     if let Some(currents) = currents {
         options.wiring.spread(currents);
     }
-    file.uncertainty = found;
     progress.end();
-    Ok(())
+    Ok(found)
 }
 
 /// The points that are looked at.

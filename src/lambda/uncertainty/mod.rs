@@ -19,16 +19,15 @@
 
 mod draws;
 mod error_form;
+mod felt_error;
 mod runtime;
 mod study;
 
 pub use draws::{Draw, draws};
 pub use error_form::ErrorForm;
+pub use felt_error::{CauseCost, CurrentsError, FeltError, RobustSetting, Shares, Study, TradeOff};
 pub use runtime::{RobustForm, RobustRuntime};
-pub use study::{
-    CauseCost, CurrentsError, Drawn, FeltError, RobustSetting, Shares, Study, StudyError,
-    Surroundings, TradeOff, study,
-};
+pub use study::{Drawn, Surroundings, study};
 
 use fluxform_base::uncertainty::Uncertainty;
 
@@ -178,6 +177,11 @@ impl Forms {
             }
         }
         forms
+    }
+
+    /// Of currents, upward and sideways, N^2.
+    pub(crate) fn values(&self, currents_a: &[f64]) -> [f64; 2] {
+        [&self.upward, &self.sideways].map(|form| form.value(currents_a))
     }
 
     /// Upward and sideways parts as one, the sideways one counting if the request is a vector.

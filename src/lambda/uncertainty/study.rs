@@ -4,17 +4,21 @@
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use fluxform_base::uncertainty::{Cause, Uncertainty};
 
+use super::felt_error::{
+    CauseCost, CurrentsError, FeltError, RobustSetting, Shares, Study, TradeOff,
+};
 use super::{Draw, ErrorForm, Forms, ON_AXES, ON_DIAGONALS, RULE, Reach, Turned, displacements_m};
-use crate::allocation::{Allocator, AllocatorError};
-use crate::problem::{ForceProblem, ProblemError, Settings};
-use crate::sampling::{QUARTERS, Squares, share_and_error};
+use crate::all_points::AllPoints;
+use crate::allocation::Allocator;
+use crate::feedback::FeedbackError;
+use crate::problem::{ForceProblem, Settings};
+use crate::sampling::{QUARTERS, Squares, over_all_points, share, share_and_error};
 use crate::sideways::SIDEWAYS_WEIGHT;
 use crate::vector_allocation::VectorAllocator;
+use crate::vector_feedback::QuarterErrors;
 
 /// Prices of the curve, from the highest down by this factor.
 const PRICES: i32 = 21;
@@ -30,18 +34,7 @@ const TILTS: usize = 8;
 /// Turns by which the drivers' signs follow the error's direction.
 const SIGN_TURNS: usize = 3;
 
-/// Why there is no study.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StudyError {
-    /// Not a force problem.
-    #[error(transparent)]
-    Problem(#[from] ProblemError),
-    /// Limits or resistances beyond what can be allocated.
-    #[error(transparent)]
-    Allocator(#[from] AllocatorError),
-}
-
-/// An object's points with the forces around them.
+/// Some of an object's points with the forces around them.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     /// Heights, weights and limits; its forces and pulls are not looked at.
@@ -56,120 +49,6 @@ pub struct Surroundings<'a> {
     pub pull_n: Option<&'a [f64]>,
     /// The quarter of every point ([`crate::sampling::quarters`]).
     pub quarters: &'a [usize],
-}
-
-/// Errors of the felt force: root mean squares of its difference from the requested one over the points and
-/// the uncertainties, relative to that of the requested force.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct FeltError {
-    /// Of the whole vector.
-    pub expected: f64,
-    /// Of its upward part.
-    pub vertical: f64,
-    /// Of its sideways part.
-    pub sideways: f64,
-    /// The longest difference at any point that was found within the bounds, relative to the largest requested force: of
-    /// states on them and of the random displays, which are no proof that there is no longer one.
-    pub worst: f64,
-    /// Mean power in the coils, W.
-    pub mean_power_w: f64,
-}
-
-/// The error that currents of one kind promise, and that of random displays.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct CurrentsError {
-    /// By the quadratic form; `worst` is the longer one of those that a search on the bounds and the random displays find.
-    pub promised: FeltError,
-    /// Of random displays within the bounds; `worst` is the worst of them.
-    pub realised: FeltError,
-}
-
-/// A point of the trade-off between error and power.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct TradeOff {
-    /// The price of power at which both are least together, N^2/W.
-    pub price_n2_per_w: f64,
-    /// Mean power over the points, W.
-    pub mean_power_w: f64,
-    /// See [`FeltError`].
-    pub expected: f64,
-    /// See [`FeltError`].
-    pub vertical: f64,
-    /// See [`FeltError`].
-    pub sideways: f64,
-}
-
-/// Currents chosen for the uncertainties.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RobustSetting {
-    /// The chosen price of power, N^2/W: with it a runtime finds the currents at any place.
-    pub price_n2_per_w: f64,
-    /// Their errors.
-    pub error: CurrentsError,
-    /// Error against power, the least power first.
-    pub trade_off: Vec<TradeOff>,
-    /// Static currents, A; absent where every point has its own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub currents_a: Option<Vec<f64>>,
-}
-
-/// A share of the requested force with each kind of currents.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Shares {
-    /// With the static currents.
-    #[serde(rename = "static")]
-    pub fixed: f64,
-    /// With feedback, currents of least power.
-    pub feedback: f64,
-    /// With feedback, currents chosen for the uncertainties.
-    pub robust: f64,
-}
-
-/// The error that one uncertainty causes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct CauseCost {
-    /// Which.
-    pub cause: Cause,
-    /// Its bound: m, degrees, C or a share.
-    pub bound: f64,
-    /// The error that it adds alone: the root of the difference of squares with and without it.
-    pub alone: Shares,
-    /// By how much the expected error that currents are chosen for falls when its bound is half as large: the
-    /// vector's, or the upward one where that alone is requested. Currents for the uncertainties are chosen again.
-    pub halving_gains: Shares,
-}
-
-/// The felt error under uncertainty.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Study {
-    /// The bounds.
-    pub given: Uncertainty,
-    /// The force constant, N/m.
-    pub lambda_n_per_m: f64,
-    /// Points looked at, evenly among all.
-    pub points: usize,
-    /// Random displays.
-    pub draws: usize,
-    /// The limit of the mean power, W; absent without one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub power_cap_w: Option<f64>,
-    /// The static currents.
-    #[serde(rename = "static")]
-    pub fixed: CurrentsError,
-    /// Feedback, currents of least power.
-    pub feedback: CurrentsError,
-    /// Static currents chosen for the uncertainties.
-    pub robust_static: RobustSetting,
-    /// Feedback, currents chosen for the uncertainties.
-    pub robust: RobustSetting,
-    /// The expected errors of the same currents if nothing were uncertain.
-    pub exact: Shares,
-    /// By how much the expected errors may be off, being those of so many points; absent in files of programs without
-    /// it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sampling: Option<Shares>,
-    /// The error that each uncertainty causes, the one first whose halving gains most.
-    pub causes: Vec<CauseCost>,
 }
 
 impl Surroundings<'_> {
@@ -191,6 +70,11 @@ impl Surroundings<'_> {
 
     fn request_n(&self, point: usize, lambda: f64) -> [f64; 3] {
         self.direction[point].map(|part| lambda * self.problem.height_m[point] * part)
+    }
+
+    fn requested_n2(&self, point: usize, lambda: f64) -> f64 {
+        let request = self.request_n(point, lambda);
+        request.iter().map(|part| part * part).sum()
     }
 
     fn weight(&self, point: usize) -> f64 {
@@ -234,49 +118,66 @@ impl Surroundings<'_> {
 }
 
 /// Currents of a study.
-enum Currents {
+struct Currents {
+    own: OwnCurrents,
+    /// Their errors at all points of the object with nothing uncertain, where those are known.
+    of_all: Option<QuarterErrors>,
+}
+
+enum OwnCurrents {
     Static(Vec<f64>),
     /// Of every point.
-    Own(Vec<Vec<f64>>),
+    PerPoint(Vec<Vec<f64>>),
 }
 
 impl Currents {
     fn at(&self, point: usize) -> &[f64] {
-        match self {
-            Self::Static(currents) => currents,
-            Self::Own(all) => &all[point],
+        match &self.own {
+            OwnCurrents::Static(currents) => currents,
+            OwnCurrents::PerPoint(all) => &all[point],
         }
     }
+
+    /// With the errors at all points, if they are static.
+    fn over(mut self, all: &AllPoints) -> Result<Self, FeedbackError> {
+        if let OwnCurrents::Static(own) = &self.own {
+            self.of_all = Some(all.of_static(own)?);
+        }
+        Ok(self)
+    }
 }
+
+/// A point with the squares of its upward and sideways error, N^2.
+type PointError = (usize, [f64; 2]);
 
 /// The points with what all sums over them need.
 struct Bench<'a> {
     around: &'a Surroundings<'a>,
+    all: &'a AllPoints<'a>,
     lambda: f64,
     weight: f64,
     /// Mean square of the requested force, N^2.
     requested_n2: f64,
     most_requested_n: f64,
+    /// With nothing uncertain.
+    exact: Vec<Forms>,
 }
 
 impl<'a> Bench<'a> {
-    fn new(around: &'a Surroundings<'a>, lambda: f64) -> Self {
-        let points = 0..around.problem.points();
-        let square = |point| {
-            let request = around.request_n(point, lambda);
-            request.iter().map(|part| part * part).sum::<f64>()
-        };
+    fn new(around: &'a Surroundings<'a>, all: &'a AllPoints<'a>) -> Self {
+        let (points, lambda) = (0..around.problem.points(), all.lambda_n_per_m);
         let weight: f64 = points.clone().map(|point| around.weight(point)).sum();
         let requested: f64 = points
-            .clone()
-            .map(|point| around.weight(point) * square(point))
+            .map(|point| around.weight(point) * around.requested_n2(point, lambda))
             .sum();
         Self {
             around,
+            all,
             lambda,
             weight,
             requested_n2: requested / weight,
-            most_requested_n: points.map(square).fold(0.0, f64::max).sqrt(),
+            most_requested_n: all.most_requested_n(),
+            exact: around.forms(lambda, &Uncertainty::default(), Reach::Point),
         }
     }
 
@@ -285,16 +186,11 @@ impl<'a> Bench<'a> {
         ohm.iter().zip(currents).map(|(ohm, i)| ohm * i * i).sum()
     }
 
-    /// Shares and power from sums of upward and sideways squares and of power; no worst.
-    fn shares(&self, upward: f64, sideways: f64, power: f64) -> FeltError {
-        let share = |sum: f64| (sum / self.weight / self.requested_n2).sqrt();
-        FeltError {
-            expected: share(upward + sideways),
-            vertical: share(upward),
-            sideways: share(sideways),
-            worst: 0.0,
-            mean_power_w: power / self.weight,
-        }
+    /// Mean power of the points looked at, W.
+    fn power_of_some_w(&self, currents: &Currents) -> f64 {
+        let of_point = |point| self.around.weight(point) * self.power_w(currents.at(point));
+        let sum: f64 = (0..self.around.problem.points()).map(of_point).sum();
+        sum / self.weight
     }
 
     /// The objective: the error of the requested force.
@@ -306,52 +202,92 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Expected errors by forms.
-    fn expected(&self, forms: &[Forms], currents: &Currents) -> FeltError {
-        let [mut upward, mut sideways, mut power] = [0.0; 3];
-        for (point, forms) in forms.iter().enumerate() {
-            let (weight, own) = (self.around.weight(point), currents.at(point));
-            upward += weight * forms.upward.value(own);
-            sideways += weight * forms.sideways.value(own);
-            power += weight * self.power_w(own);
+    /// Sums of errors by quarters.
+    fn squares(&self, errors: &[PointError]) -> [Squares; QUARTERS] {
+        let mut quarters = [Squares::default(); QUARTERS];
+        for (point, [upward, sideways]) in errors {
+            let weight = self.around.weight(*point);
+            let quarter = &mut quarters[self.around.quarters[*point]];
+            quarter.upward += weight * upward;
+            quarter.sideways += weight * sideways;
+            quarter.requested += weight * self.around.requested_n2(*point, self.lambda);
         }
-        self.shares(upward, sideways, power)
+        quarters
     }
 
-    /// By how much the expected error may be off, being that of some points.
-    fn sampling(&self, forms: &[Forms], currents: &Currents) -> f64 {
-        let mut quarters = [Squares::default(); QUARTERS];
-        for (point, forms) in forms.iter().enumerate() {
-            let (weight, own) = (self.around.weight(point), currents.at(point));
-            let quarter = &mut quarters[self.around.quarters[point]];
-            quarter.error += weight * (forms.upward.value(own) + forms.sideways.value(own));
-            let request = self.around.request_n(point, self.lambda);
-            quarter.requested += weight * request.iter().map(|part| part * part).sum::<f64>();
+    /// The same of all points of the object where the errors of the currents there are known.
+    fn over_all(&self, errors: &[PointError], currents: &Currents) -> [Squares; QUARTERS] {
+        let some = self.squares(errors);
+        let Some(of_all) = currents.of_all else {
+            return some;
+        };
+        let exact = |(point, _): &PointError| {
+            let own = currents.at(*point);
+            (*point, self.exact[*point].values(own))
+        };
+        let exact: Vec<PointError> = errors.iter().map(exact).collect();
+        over_all_points(&of_all.squares, &some, &self.squares(&exact))
+    }
+
+    /// Expected errors by forms.
+    fn by_forms(forms: &[Forms], currents: &Currents) -> Vec<PointError> {
+        let of_point = |(point, forms): (usize, &Forms)| (point, forms.values(currents.at(point)));
+        forms.iter().enumerate().map(of_point).collect()
+    }
+
+    /// Shares of the errors, and power; no worst.
+    fn felt(&self, errors: &[PointError], currents: &Currents) -> FeltError {
+        let squares = self.over_all(errors, currents);
+        FeltError {
+            expected: share(&squares, |of| of.upward + of.sideways),
+            vertical: share(&squares, |of| of.upward),
+            sideways: share(&squares, |of| of.sideways),
+            worst: 0.0,
+            mean_power_w: currents.of_all.map_or_else(
+                || self.power_of_some_w(currents),
+                |of_all| of_all.mean_power_w,
+            ),
         }
-        share_and_error(&quarters).1
+    }
+
+    fn expected(&self, forms: &[Forms], currents: &Currents) -> FeltError {
+        self.felt(&Self::by_forms(forms, currents), currents)
+    }
+
+    /// By how much the expected errors may be off, being those of some points.
+    fn sampling(&self, forms: &[Forms], [fixed, feedback, robust]: [&Currents; 3]) -> Shares {
+        let of = |currents: &Currents| {
+            let errors = Self::by_forms(forms, currents);
+            let of_some = share_and_error(&self.squares(&errors));
+            (of_some, share_and_error(&self.over_all(&errors, currents)))
+        };
+        let ((of_some, _), (of_all, feedback_off)) = of(feedback);
+        Shares {
+            fixed: of(fixed).1.1,
+            feedback: feedback_off,
+            // Quarters may all miss a strip that decides; by how much the same points miss with feedback is known.
+            robust: of(robust).1.1 + (of_some - of_all).abs(),
+        }
     }
 
     /// Of the random displays, whose forces per ampere and pulls are given.
     fn realised(&self, drawn: &Drawn, currents: &Currents) -> FeltError {
         let coils = self.around.problem.coils();
-        let [mut upward, mut sideways, mut power, mut weights, mut worst] = [0.0_f64; 5];
-        for (k, draw) in drawn.draws.iter().enumerate() {
-            let weight = self.around.weight(draw.point);
-            let own = currents.at(draw.point);
+        let mut worst_n2 = 0.0_f64;
+        let mut of_draw = |(k, draw): (usize, &Draw)| {
             let field = &drawn.fields[k * coils..(k + 1) * coils];
-            let force = draw.force_n(field, drawn.pull_n.map_or(0.0, |all| all[k]), own);
+            let pull_n = drawn.pull_n.map_or(0.0, |all| all[k]);
+            let force = draw.force_n(field, pull_n, currents.at(draw.point));
             let request = self.around.request_n(draw.point, self.lambda);
             let [x, y, z]: [f64; 3] = std::array::from_fn(|axis| force[axis] - request[axis]);
-            upward += weight * z * z;
-            sideways += weight * (x * x + y * y);
-            power += weight * self.power_w(own);
-            weights += weight;
-            worst = worst.max(x.hypot(y).hypot(z));
-        }
-        let scale = self.weight / weights;
+            let (upward, sideways) = (z * z, x * x + y * y);
+            worst_n2 = worst_n2.max(upward + sideways);
+            (draw.point, [upward, sideways])
+        };
+        let errors: Vec<PointError> = drawn.draws.iter().enumerate().map(&mut of_draw).collect();
         FeltError {
-            worst: worst / self.most_requested_n,
-            ..self.shares(scale * upward, scale * sideways, scale * power)
+            worst: worst_n2.sqrt() / self.most_requested_n,
+            ..self.felt(&errors, currents)
         }
     }
 
@@ -410,9 +346,12 @@ impl<'a> Bench<'a> {
         currents: &Currents,
     ) -> CurrentsError {
         let realised = self.realised(drawn, currents);
+        let exact_n = currents.of_all.map_or(0.0, |of_all| of_all.worst_n);
+        let exact = exact_n / self.most_requested_n;
+        let worst = self.worst(given, currents).max(realised.worst);
         CurrentsError {
             promised: FeltError {
-                worst: self.worst(given, currents).max(realised.worst),
+                worst: worst.max(exact),
                 ..self.expected(forms, currents)
             },
             realised,
@@ -462,7 +401,7 @@ pub struct Drawn<'a> {
 }
 
 /// The currents of least power for the request at every point (eq. 8).
-fn followed(around: &Surroundings, lambda: f64) -> Result<Currents, StudyError> {
+fn followed(around: &Surroundings, all: &AllPoints) -> Result<Currents, FeedbackError> {
     let problem = &around.problem;
     let (ohm, lower, upper) = (problem.resistance_ohm, problem.lower_a, problem.upper_a);
     let total = problem.total_max_a;
@@ -471,7 +410,7 @@ fn followed(around: &Surroundings, lambda: f64) -> Result<Currents, StudyError> 
     let own = |point| {
         let field = around.field(point, 0);
         let mut currents = vec![0.0; problem.coils()];
-        let [x, y, z] = around.request_n(point, lambda);
+        let [x, y, z] = around.request_n(point, all.lambda_n_per_m);
         let z = z - around.pull_n(point, 0);
         if around.vector {
             let rows: Vec<[f64; 3]> = field.iter().map(|f| [f[0], f[1], f[2]]).collect();
@@ -482,7 +421,10 @@ fn followed(around: &Surroundings, lambda: f64) -> Result<Currents, StudyError> 
         }
         currents
     };
-    Ok(Currents::Own((0..problem.points()).map(own).collect()))
+    Ok(Currents {
+        own: OwnCurrents::PerPoint((0..problem.points()).map(own).collect()),
+        of_all: Some(all.feedback),
+    })
 }
 
 /// Chooses currents along the trade-off of error and power.
@@ -522,20 +464,30 @@ impl<'a> Chooser<'a> {
             currents
         };
         let mut own: Vec<Vec<f64>> = self.combined.par_iter().map(one).collect();
-        let currents = if self.fixed {
-            Currents::Static(own.swap_remove(0))
+        let own = if self.fixed {
+            OwnCurrents::Static(own.swap_remove(0))
         } else {
-            Currents::Own(own)
+            OwnCurrents::PerPoint(own)
         };
+        let currents = Currents { own, of_all: None };
         let error = self.bench.expected(self.forms, &currents);
         (currents, error)
     }
 
-    /// The setting, and the curve; `top` is the highest price.
-    fn choose(&self, top: f64, cap_w: Option<f64>) -> (f64, Currents, Vec<TradeOff>) {
-        let prices = (0..PRICES).map(|k| top * PRICE_FACTOR.powi(k));
-        let curve: Vec<(f64, FeltError)> = prices.map(|price| (price, self.at(price).1)).collect();
-        let least = curve.last().map_or(0.0, |(_, error)| self.bench.aim(error));
+    /// The setting, and the curve; `top` is the highest price. Chosen by the errors at the points looked at, which the
+    /// currents make least; those that are stated are over all points.
+    fn choose(
+        &self,
+        top: f64,
+        cap_w: Option<f64>,
+    ) -> Result<(f64, Currents, Vec<TradeOff>), FeedbackError> {
+        let of_price = |k| {
+            let price = top * PRICE_FACTOR.powi(k);
+            (price, self.at(price))
+        };
+        let curve: Vec<(f64, (Currents, FeltError))> = (0..PRICES).map(of_price).collect();
+        let last = curve.last();
+        let least = last.map_or(0.0, |(_, (_, error))| self.bench.aim(error));
         // Above the price at which this ends, power is too dear: too little error is bought, or the cap holds.
         let dear = |error: &FeltError| match cap_w {
             Some(cap) => error.mean_power_w <= cap,
@@ -547,7 +499,7 @@ impl<'a> Chooser<'a> {
                 high *= 2.0;
             }
         }
-        let cheap = curve.iter().find(|(_, error)| !dear(error));
+        let cheap = curve.iter().find(|(_, (_, error))| !dear(error));
         // Without a crossing the cheapest of the curve does.
         let mut low = cheap.or(curve.last()).map_or(top, |(price, _)| *price);
         for _ in 0..if cheap.is_some() { HALVINGS } else { 0 } {
@@ -563,20 +515,25 @@ impl<'a> Chooser<'a> {
         } else {
             low
         };
-        let point = |(price, error): (f64, FeltError)| TradeOff {
-            price_n2_per_w: price,
-            mean_power_w: error.mean_power_w,
-            expected: error.expected,
-            vertical: error.vertical,
-            sideways: error.sideways,
+        let point = |(price_n2_per_w, (currents, _)): (f64, (Currents, FeltError))| {
+            let currents = currents.over(self.bench.all)?;
+            let error = self.bench.expected(self.forms, &currents);
+            Ok::<_, FeedbackError>(TradeOff {
+                price_n2_per_w,
+                mean_power_w: error.mean_power_w,
+                expected: error.expected,
+                vertical: error.vertical,
+                sideways: error.sideways,
+            })
         };
-        let currents = self.at(price).0;
-        (price, currents, curve.into_iter().map(point).collect())
+        let currents = self.at(price).0.over(self.bench.all)?;
+        let curve = curve.into_iter().map(point);
+        Ok((price, currents, curve.collect::<Result<_, _>>()?))
     }
 }
 
-/// The felt error of `lambda_n_per_m` under what is `given` to be uncertain, static currents being
-/// `static_currents_a`; at most `power_cap_w` of mean power, if given. `None` where no force is requested.
+/// The felt error of the lambda of `all` under what is `given` to be uncertain, looked at `around` some of its points; at
+/// most `power_cap_w` of mean power, if given. `None` where no force is requested.
 ///
 /// # Errors
 /// Where the problem is malformed.
@@ -585,38 +542,40 @@ impl<'a> Chooser<'a> {
 /// When there are fewer forces than points, displacements and coils.
 pub fn study(
     around: &Surroundings,
-    lambda_n_per_m: f64,
-    static_currents_a: &[f64],
+    all: &AllPoints,
     (given, power_cap_w): (&Uncertainty, Option<f64>),
     drawn: &Drawn,
-) -> Result<Option<Study>, StudyError> {
+) -> Result<Option<Study>, FeedbackError> {
     around.problem.validate(&Settings::default())?;
-    let bench = Bench::new(around, lambda_n_per_m);
-    if bench.requested_n2 <= 0.0 {
+    let bench = Bench::new(around, all);
+    if bench.requested_n2 <= 0.0 || bench.most_requested_n <= 0.0 {
         return Ok(None);
     }
-    let forms = around.forms(lambda_n_per_m, given, Reach::Whole);
-    let fixed = Currents::Static(static_currents_a.to_vec());
-    let feedback = followed(around, lambda_n_per_m)?;
+    let forms = around.forms(bench.lambda, given, Reach::Whole);
+    let fixed = Currents {
+        own: OwnCurrents::Static(all.static_a.to_vec()),
+        of_all: Some(all.fixed),
+    };
+    let feedback = followed(around, all)?;
     // A watt of the currents of least power for a square of the whole force.
-    let power_w = bench.expected(&forms, &feedback).mean_power_w;
+    let power_w = bench.power_of_some_w(&feedback);
     let top = bench.requested_n2 / power_w.max(f64::MIN_POSITIVE);
     let choose = |fixed: bool| {
         let chooser = Chooser::new(&bench, &forms, fixed);
-        let (price_n2_per_w, currents, trade_off) = chooser.choose(top, power_cap_w);
+        let (price_n2_per_w, currents, trade_off) = chooser.choose(top, power_cap_w)?;
         let setting = RobustSetting {
             price_n2_per_w,
             error: bench.error(&forms, drawn, given, &currents),
             trade_off,
-            currents_a: match &currents {
-                Currents::Static(own) => Some(own.clone()),
-                Currents::Own(_) => None,
+            currents_a: match &currents.own {
+                OwnCurrents::Static(own) => Some(own.clone()),
+                OwnCurrents::PerPoint(_) => None,
             },
         };
-        (setting, currents)
+        Ok::<_, FeedbackError>((setting, currents))
     };
-    let (robust_static, _) = choose(true);
-    let (robust, robust_currents) = choose(false);
+    let (robust_static, _) = choose(true)?;
+    let (robust, robust_currents) = choose(false)?;
     let (exact, causes) = Costs {
         bench: &bench,
         given,
@@ -629,15 +588,11 @@ pub fn study(
     debug_assert!(around.places() == displacements_m(given).len() && RULE == 14);
     Ok(Some(Study {
         given: *given,
-        lambda_n_per_m,
+        lambda_n_per_m: bench.lambda,
         points: around.problem.points(),
         draws: drawn.draws.len(),
         power_cap_w,
-        sampling: Some(Shares {
-            fixed: bench.sampling(&forms, &fixed),
-            feedback: bench.sampling(&forms, &feedback),
-            robust: bench.sampling(&forms, &robust_currents),
-        }),
+        sampling: Some(bench.sampling(&forms, [&fixed, &feedback, &robust_currents])),
         fixed: bench.error(&forms, drawn, given, &fixed),
         feedback: bench.error(&forms, drawn, given, &feedback),
         robust_static,
@@ -676,8 +631,7 @@ impl Costs<'_> {
     /// The errors if nothing were uncertain, and the costs; `all` are the forms of everything.
     fn ranked(&self, all: &[Forms]) -> (Shares, Vec<CauseCost>) {
         let (around, lambda) = (self.bench.around, self.bench.lambda);
-        let exact = around.forms(lambda, &Uncertainty::default(), Reach::Point);
-        let [exact, _] = self.shares(&exact, self.robust);
+        let [exact, _] = self.shares(&self.bench.exact, self.robust);
         let [_, all] = self.shares(all, self.robust);
         let cost = |cause: Cause| {
             let (only, halved) = (self.given.only(cause), self.given.halved(cause));
