@@ -178,8 +178,10 @@ fn spacing_off(
     if most == 0.0 {
         // Single smooth cells between samples. Where those are not points, the smooth corners are no worse than those
         // of the others were; else the least is known by which they are called smooth.
-        return Ok(fine.map_or(ALL, |fine| {
-            let [smooth, others] = [areas, fine.areas].map(|of| of.iter().sum::<f64>());
+        let sum = |of: &[f64]| of.iter().sum::<f64>();
+        let known = fine.filter(|fine| sum(fine.areas) > 0.0);
+        return Ok(known.map_or(ALL, |fine| {
+            let [smooth, others] = [areas, fine.areas].map(sum);
             SPACING_TO_ERROR
                 * match fine.are_points {
                     true => places.smooth_within * smooth / (smooth + others),

@@ -460,12 +460,18 @@ pub(super) fn solve_with(
     Ok(solved(Steel::Alone(Box::new(alone)), steel_error))
 }
 
-/// The largest current that a coil can have, A: the rated one, or the supply's.
+/// The largest current that a coil can have in either direction, A: its own limit, or what the limit of the sum leaves it
+/// where the others run as far below zero as they can.
 fn most_current_a(scene: &Scene) -> f64 {
     let total_a = scene.design.supply.total_current_max_a;
-    scene
-        .rated_current_a()
-        .min(total_a.unwrap_or(f64::INFINITY))
+    let total_a = total_a.unwrap_or(f64::INFINITY);
+    let least_a: f64 = scene.lower_a.iter().sum();
+    let limits_a = scene.lower_a.iter().zip(&scene.upper_a);
+    let most_a = limits_a.map(|(lower_a, upper_a)| {
+        let left_a = total_a - (least_a - lower_a);
+        upper_a.min(left_a).max(-lower_a)
+    });
+    most_a.fold(0.0, f64::max)
 }
 
 /// One core along its B-H curve, alone at the largest current that a coil can have.

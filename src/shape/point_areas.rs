@@ -75,10 +75,10 @@ impl Over<'_> {
         self.lattice.map_or(0.0, |lattice| lattice.rise_m(cell))
     }
 
-    /// By how much it lies below that somewhere, if by more than `by_m`, m.
-    fn fall_m(&self, cell: usize, by_m: f64) -> f64 {
+    /// Whether it lies below that by more than `by_m` somewhere, or has gaps.
+    fn falls(&self, cell: usize, by_m: f64) -> bool {
         self.lattice
-            .map_or(0.0, |lattice| lattice.fall_m(cell, by_m, self.height_m))
+            .is_some_and(|lattice| lattice.fallen_m2(cell, by_m) > 0.0)
     }
 
     /// All that covers a missed cell as one sample, for want of effort; none of other cells.
@@ -422,8 +422,8 @@ fn broken_cells(
                 let off = |height: f64| ((height - mean) / mean).abs();
                 let between = surface.rise_m(cell) / mean;
                 let departs = (surface.height_m)(middle).map_or(0.0, off).max(between);
-                match departs <= SMOOTH {
-                    true => departs.max(surface.fall_m(cell, SMOOTH * mean) / mean),
+                match departs <= SMOOTH && surface.falls(cell, SMOOTH * mean) {
+                    true => 1.0,
                     false => departs,
                 }
             }

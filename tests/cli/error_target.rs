@@ -347,3 +347,18 @@ fn regression_heights_that_samples_below_the_grid_do_not_have_were_not_counted()
         assert!(off <= stated + left, "{error}: {off} of {stated}");
     }
 }
+
+/// A strip between skipped points, too narrow for any comparison, had an error that is no number: the page said NaN, and
+/// JSON and bundle blamed the disk.
+#[test]
+fn regression_a_strip_too_narrow_to_compare_had_an_error_that_is_no_number() {
+    let place = Place::new();
+    let grid = "[points]\nx_mm = [-60, 0, 3]\ny_mm = [-30, 30, 5]\noutside = \"skip\"\n";
+    let text = format!("primitive = \"flat\"\nside_mm = 60\nheight_mm = 50\n{grid}");
+    let strip = shape(&place, "strip", &text);
+    let ran = place.run(&["lambda", SEED, &strip, "--format", "json"]);
+    let run = ran.ends(0).json();
+    let stated = number(&run["headline"]["force_error"]);
+    assert!(stated >= 1.0, "{stated}");
+    assert_eq!(run["headline"]["budget"][0]["part"], "points");
+}

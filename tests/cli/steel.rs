@@ -488,6 +488,42 @@ fn forces_of_a_saturated_core_hold_at_its_limit_alone() {
     );
 }
 
+/// Regression: the current that cores are solved at was the upper limit, whatever ran below zero, and the limit of the sum,
+/// whatever the other coils leave of it: gradients were 36 % too large, and nothing said so.
+#[test]
+fn cores_saturate_at_the_largest_current_of_either_direction() {
+    let place = Place::new();
+    place.write("at.csv", "x_m,y_m,z_m\n0,0,0.03\n");
+    let gradient = |array: &str, supply: &str| {
+        saturated(&place, array, supply);
+        let args = [
+            "probe",
+            "saturated.toml",
+            "at.csv",
+            "--components",
+            "gz",
+            "--format",
+            "json",
+        ];
+        let json = place.run(&args).ends(0).json();
+        json["columns"]["dbz_dz_t_per_m_per_a"][0].as_f64().unwrap()
+    };
+    let two = "[array]\npositions_mm = [[0.0, 0.0], [300.0, 0.0]]\ncoupling = \"none\"\n";
+    let expected = gradient("", "current_max_a = 10");
+    let small = gradient("", "current_max_a = 0.5");
+    assert!((small / expected - 1.0).abs() > 0.1, "{small} {expected}");
+    let reverse = gradient("", "current_max_a = 0.5\ncurrent_min_a = -10");
+    assert!(
+        (reverse / expected - 1.0).abs() < 1e-9,
+        "{reverse} {expected}"
+    );
+    // One has 10 A where the other has -9.5 A.
+    let supply = "current_max_a = 10\ncurrent_min_a = -10\ntotal_current_max_a = 0.5";
+    let opposed = gradient(two, supply);
+    let alone = gradient(two, "current_max_a = 10");
+    assert!((opposed / alone - 1.0).abs() < 1e-9, "{opposed} {alone}");
+}
+
 /// Regression: coupled cores of a B-H curve were linear with the permeability at the mean |B| of one alone, which above
 /// the knee left the gradient 5.9 % (6 A) and 33 % (20 A) off where no neighbour is near, beside a stated error of 1e-5.
 #[test]

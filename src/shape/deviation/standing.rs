@@ -1,11 +1,15 @@
 //! What stands over a rectangle: the surface that covers it, and what of that rises above a patch.
 
-use super::piece::{Patch, Point, Polygon, Rect};
+use super::piece::{Face, Patch, Point, Polygon, Rect};
 use super::union::area_m2;
 use super::{Faces, Lattice};
 
 /// Faces below a patch that are looked at, at most.
 const FLOORS: usize = 4;
+/// Faces whose area is united, at most.
+const MOST_PIECES: usize = 32;
+/// A smaller share of a rectangle is no area: faces that meet leave rounding open.
+const NO_AREA: f64 = 1e-4;
 /// Places of a rectangle, as parts of its sides, that leave no quarter of either side out beside its middle.
 const PLACES: [Point; 4] = [[0.27, 0.83], [0.71, 0.36], [0.13, 0.19], [0.89, 0.61]];
 
@@ -47,23 +51,75 @@ impl Faces {
         above.fold(0.0, f64::max)
     }
 
-    /// The faces that surpass a patch by more than `by_m`; `None` without any.
-    pub(crate) fn risen(&self, patch: &Patch, among: &[u32], by_m: f64) -> Option<Standing> {
-        let pieces: Vec<Polygon> = (self.rising(patch, among, by_m))
-            .map(|(piece, _)| piece)
+    /// The highest place of the surface over a rectangle, m; `None` without any.
+    pub(crate) fn highest_m(&self, rect: &Rect, among: &[u32]) -> Option<f64> {
+        let heights = self.pieces(rect, among, f64::NEG_INFINITY);
+        let corners = heights.flat_map(|(face, piece)| {
+            let corners = piece.corners().iter().map(|p| face.height(*p));
+            corners.fold(None, |most: Option<f64>, z| {
+                Some(most.map_or(z, |m| m.max(z)))
+            })
+        });
+        corners.reduce(f64::max)
+    }
+
+    /// What of the surface over a rectangle lies above a level; `None` where nothing does, or too many faces do.
+    pub(crate) fn above(&self, rect: &Rect, among: &[u32], level_m: f64) -> Option<Standing> {
+        let pieces = self.pieces(rect, among, level_m);
+        let pieces = pieces.map(|(face, piece)| piece.cut(|p| face.height(p) - level_m));
+        let pieces: Vec<Polygon> = (pieces.take(MOST_PIECES + 1))
+            .filter(|piece| piece.width() > self.hair.plan_m)
             .collect();
+        if pieces.is_empty() || pieces.len() > MOST_PIECES {
+            return None;
+        }
         Standing::of(&pieces, area_m2(&pieces))
     }
 
-    /// By how much the surface lies below a patch, if by more than `by_m`, as far as looks at some places tell, m: the
-    /// middles of the highest faces that do so, since a floor below the surface lies lower, and some of the whole, since
-    /// faces may be larger. 0 where there is no such face, or none is seen. `height_m` is that of the surface.
-    pub(crate) fn fall_m(
+    /// The faces that reach above a level, with their pieces over a rectangle.
+    fn pieces<'a>(
+        &'a self,
+        rect: &'a Rect,
+        among: &'a [u32],
+        level_m: f64,
+    ) -> impl Iterator<Item = (&'a Face, Polygon)> + 'a {
+        let faces = among.iter().map(|face| &self.list[*face as usize]);
+        let reaching = faces.filter(move |face| face.heights[1] > level_m);
+        reaching
+            .map(|face| (face, face.within(rect)))
+            .filter(|(_, piece)| piece.width() > self.hair.plan_m)
+    }
+
+    /// The area over which the surface lies below a patch by more than `by_m`, or has gaps, m^2: what no face covers that
+    /// lies higher somewhere.
+    pub(crate) fn fallen_m2(&self, patch: &Patch, among: &[u32], by_m: f64) -> f64 {
+        let pieces: Vec<Polygon> = (self.rising(patch, among, -by_m))
+            .map(|(piece, _)| piece)
+            .collect();
+        let [width, depth] = patch.rect.sides();
+        let sum_m2: f64 = pieces.iter().map(Polygon::area).sum();
+        // No more than all: nothing is covered twice.
+        let covered_m2 = match sum_m2 <= width * depth * (1.0 + NO_AREA) {
+            true => sum_m2,
+            false => area_m2(&pieces),
+        };
+        let open_m2 = width * depth - covered_m2;
+        if open_m2 > NO_AREA * width * depth {
+            open_m2
+        } else {
+            0.0
+        }
+    }
+
+    /// The lowest place under a patch, below it by more than `by_m`, among some that are looked at, with its height, m: the
+    /// middles of the highest faces that lie so, since a floor below the surface lies lower, and some of the whole, since
+    /// faces may be larger. `height_m` is that of the surface.
+    pub(crate) fn fallen_to(
         &self,
         (patch, among): (&Patch, &[u32]),
         by_m: f64,
         mut height_m: impl FnMut(Point) -> Option<f64>,
-    ) -> f64 {
+    ) -> Option<(Point, f64)> {
         let faces = among.iter().map(|face| &self.list[*face as usize]);
         let middles = faces.filter_map(|face| {
             let [_, most_m] = face.most_off_m(&patch.rect, patch, self.hair);
@@ -72,16 +128,12 @@ impl Faces {
             (piece.width() > self.hair.plan_m).then(|| (middle, face.height(middle)))
         });
         let mut middles: Vec<(Point, f64)> = middles.collect();
-        if middles.is_empty() {
-            return 0.0;
-        }
         middles.sort_by(|a, b| b.1.total_cmp(&a.1));
         let middles = middles.iter().take(FLOORS).map(|(at, _)| *at);
         let of_whole = PLACES.map(|part| patch.rect.at(part));
-        let falls = (middles.chain(of_whole))
-            .filter_map(|at| Some(patch.height_m(at) - height_m(at)?))
-            .find(|fall_m| *fall_m > by_m);
-        falls.unwrap_or(0.0)
+        let seen = (middles.chain(of_whole)).filter_map(|at| Some((at, height_m(at)?)));
+        seen.filter(|(at, height_m)| patch.height_m(*at) - height_m > by_m)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// The pieces of faces over a patch that surpass it by more than `by_m`, and by how much.
@@ -122,17 +174,9 @@ impl Lattice<'_> {
         self.patch(cell).map_or(0.0, rise_m)
     }
 
-    /// [`Faces::fall_m`] over a cell of four points; 0 over others.
-    pub(crate) fn fall_m(
-        &self,
-        cell: usize,
-        by_m: f64,
-        height_m: impl FnMut(Point) -> Option<f64>,
-    ) -> f64 {
-        let fall_m = |patch: Patch| {
-            let among = self.members(cell);
-            self.faces.fall_m((&patch, &among), by_m, height_m)
-        };
-        self.patch(cell).map_or(0.0, fall_m)
+    /// [`Faces::fallen_m2`] over a cell of four points; 0 over others.
+    pub(crate) fn fallen_m2(&self, cell: usize, by_m: f64) -> f64 {
+        let fallen = |patch: Patch| self.faces.fallen_m2(&patch, &self.members(cell), by_m);
+        self.patch(cell).map_or(0.0, fallen)
     }
 }

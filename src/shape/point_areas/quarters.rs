@@ -12,6 +12,10 @@ use fluxform_numerics::axis::Axis;
 /// over its share of the cell: what a part adds to lambda's error is its departure times
 /// its area.
 const SMOOTH_PART: f64 = 5e-4;
+/// So many times at most: departures of a texture have one sign in many parts.
+const MOST_WIDENED: f64 = 4.0;
+/// The share of a part at most that lies between a quarter and three quarters of its height where it jumps.
+const SLOPING: f64 = 0.25;
 /// Bisections of a side of a part: to 4e-3 of it.
 const PART_BISECTIONS: u32 = 8;
 
@@ -192,7 +196,7 @@ impl Quarters<'_> {
             heights_m: nodes.map(|corner| self.height_m(corner)),
             rect,
             members: (self.faces).map_or_else(Vec::new, |faces| faces.over(&rect, around)),
-            smooth: SMOOTH_PART * f64::from(1_u32 << (2 * (self.whole - depth))),
+            smooth: SMOOTH_PART * f64::from(1_u32 << (2 * (self.whole - depth))).min(MOST_WIDENED),
         };
         let smooth = match square.heights_m.iter().flatten().count() {
             _ if depth == 0 => true,
@@ -201,8 +205,7 @@ impl Quarters<'_> {
                 let (mean, middle) = (square.mean_m(), first.map(|at| at + side / 2));
                 let middle = self.height_m(middle);
                 middle.is_some_and(|height| ((height - mean) / mean).abs() <= square.smooth)
-                    && self.risen(&square).is_none()
-                    && !self.falls(&square)
+                    && !self.breaks(&square)
             }
             _ => false,
         };
@@ -233,56 +236,75 @@ impl Quarters<'_> {
         Leaf::IsNot
     }
 
-    /// What rises between the corners of a part of four, more than smooth ones do.
-    fn risen(&self, square: &Square) -> Option<Standing> {
-        (self.faces?).risen(&square.patch()?, &square.members, square.smooth_m())
+    /// Whether the surface rises or falls between the corners of a part of four, more than smooth ones do.
+    fn breaks(&self, square: &Square) -> bool {
+        let (by_m, members) = (square.smooth_m(), &square.members);
+        self.faces
+            .zip(square.patch())
+            .is_some_and(|(faces, patch)| {
+                faces.rise_m(&patch, members) > by_m || faces.fallen_m2(&patch, members, by_m) > 0.0
+            })
     }
 
-    /// Whether the surface falls between the corners of a part of four, more than smooth ones do.
-    fn falls(&mut self, square: &Square) -> bool {
-        let Some((faces, patch)) = self.faces.zip(square.patch()) else {
-            return false;
-        };
-        let over = (&patch, &square.members[..]);
-        faces.fall_m(over, square.smooth_m(), |place| self.look(place)) > 0.0
-    }
-
-    /// The lowest corner of a part, with its height; `middle` if that is lower.
-    fn lowest(&self, square: &Square, middle: ([f64; 2], f64)) -> ([f64; 2], f64) {
-        let corners = square.nodes.into_iter().zip(square.heights_m);
-        let known = corners.filter_map(|(node, height_m)| Some((self.place(node), height_m?)));
-        known.fold(middle, |low, at| if at.1 < low.1 { at } else { low })
-    }
-
-    /// What stands for a part: its piece that has surface; also what rises between its corners, or lies
-    /// between those that have no surface.
-    fn parts(&mut self, square: &Square) -> Vec<Part> {
-        let standing = if square.heights_m.iter().all(Option::is_none) {
-            (self.faces).and_then(|faces| faces.standing(&square.rect, &square.members))
-        } else {
-            self.risen(square)
-        };
-        let risen = standing.and_then(|standing| {
-            let height_m = self.look(standing.at_m)?;
-            Some(Part::of(standing, height_m))
-        });
-        let mut parts: Vec<Part> = self
-            .part(square.nodes, square.heights_m)
-            .into_iter()
-            .collect();
-        let Some(risen) = risen else {
-            return parts;
-        };
-        // What rises takes its area from the rest, whose middle may be under it.
-        for rest in &mut parts {
-            rest.area_m2 -= risen.area_m2;
-            if rest.height_m > square.mean_m() * (1.0 + square.smooth) {
-                (rest.at_m, rest.height_m) = self.lowest(square, (rest.at_m, rest.height_m));
-            }
+    /// The two levels of a part of four over which the surface jumps; `None` where it bends or slopes, which its middle
+    /// knows.
+    fn levels(&mut self, square: &Square) -> Option<[Part; 2]> {
+        let (faces, patch) = (self.faces?, square.patch()?);
+        let by_m = SMOOTH_PART * square.mean_m();
+        let rises = faces.rise_m(&patch, &square.members) > by_m;
+        if !rises && faces.fallen_m2(&patch, &square.members, by_m) <= 0.0 {
+            return None;
         }
-        parts.retain(|rest| rest.area_m2 > 0.0);
-        parts.push(risen);
-        parts
+        let middle = square.rect.centre();
+        let middle = self.look(middle).map(|height_m| (middle, height_m));
+        let over = (&patch, &square.members[..]);
+        let fallen = faces.fallen_to(over, by_m, |place| self.look(place));
+        let corners = square.nodes.into_iter().zip(square.heights_m);
+        let corners = corners.filter_map(|(node, height_m)| Some((self.place(node), height_m?)));
+        let seen = middle.into_iter().chain(fallen).chain(corners);
+        let (low_at, low_m) = seen.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let high_m = faces.highest_m(&square.rect, &square.members)?;
+        let above = |part: f64| {
+            let level_m = low_m + part * (high_m - low_m);
+            faces.above(&square.rect, &square.members, level_m)
+        };
+        let (most, half, least) = (above(0.25)?, above(0.5)?, above(0.75)?);
+        let [width, depth] = square.rect.sides();
+        if high_m - low_m <= by_m || most.area_m2 - least.area_m2 > SLOPING * width * depth {
+            return None;
+        }
+        let high = Part::of(half, self.look(half.at_m)?);
+        let level_m = 0.5 * (low_m + high_m);
+        let (at_m, height_m) = middle
+            .filter(|at| at.1 < level_m)
+            .unwrap_or((low_at, low_m));
+        let low = Part {
+            at_m,
+            height_m,
+            area_m2: width * depth - high.area_m2,
+        };
+        Some([low, high])
+    }
+
+    /// What stands for a part: its piece that has surface, or both levels where that jumps; what lies between corners that
+    /// have no surface.
+    fn parts(&mut self, square: &Square) -> Vec<Part> {
+        if square.heights_m.iter().all(Option::is_none) {
+            let faces = self.faces;
+            let standing = faces.and_then(|faces| faces.standing(&square.rect, &square.members));
+            let part = standing.and_then(|standing| {
+                let height_m = self.look(standing.at_m)?;
+                Some(Part::of(standing, height_m))
+            });
+            return part.into_iter().collect();
+        }
+        let parts = match self.levels(square) {
+            Some(levels) => levels.to_vec(),
+            None => (self.part(square.nodes, square.heights_m).into_iter()).collect(),
+        };
+        (parts.into_iter())
+            .filter(|part| part.area_m2 > 0.0)
+            .collect()
     }
 
     /// The piece of a part that has surface, with its middle; `None` without any.
