@@ -111,6 +111,10 @@ pub struct Bounded {
     pub at_least: bool,
     /// Scale of the difference; `None`: it is relative.
     scale: Option<f64>,
+    /// Excess that is none: what rounding to made lengths adds to whole lengths of wire.
+    slack: f64,
+    /// By how much a search must stay below the limit, or above it.
+    margin: f64,
 }
 
 impl Bounded {
@@ -123,6 +127,8 @@ impl Bounded {
             limit,
             at_least: false,
             scale: None,
+            slack: 0.0,
+            margin: MARGIN,
         }
     }
 
@@ -159,7 +165,7 @@ impl Bounded {
             Some(scale) => (self.value - self.limit) / scale,
             None => (self.value.max(f64::MIN_POSITIVE) / self.limit).ln(),
         };
-        if self.at_least { -over } else { over }
+        (if self.at_least { -over } else { over }) - self.slack
     }
 
     /// Whether it is met, up to the rounding of places and lengths.
@@ -167,17 +173,44 @@ impl Bounded {
     pub fn is_met(&self) -> bool {
         self.excess() <= ROUNDING
     }
+
+    /// What a search takes for the excess: above [`MET`] where the limit is broken, or may be once lengths are rounded.
+    fn judged(&self) -> f64 {
+        let excess = self.excess() + self.margin;
+        match self.ends_range() {
+            true => excess.max(FIRM * excess),
+            false => excess,
+        }
+    }
+
+    /// Whether it is the end of a range that the search may leave on its way.
+    #[must_use]
+    pub fn ends_range(&self) -> bool {
+        RANGES.contains(&self.key)
+    }
+
+    /// Whether a search takes a design for one that breaks this limit.
+    pub(super) fn is_broken(&self) -> bool {
+        self.judged() > MET
+    }
 }
 
 /// Relative rounding of places and lengths, several operations long.
 const ROUNDING: f64 = 1e-12;
-/// Distance that the search keeps from limits that are not whole lengths of wire: lengths are rounded later.
+/// Distance that the search keeps from limits on what lengths decide that are rounded later.
 const MARGIN: f64 = 3e-5;
+/// The same where nothing is rounded: the search accepts what meets the limit.
+const EXACT: f64 = MET - ROUNDING;
 /// Largest change of the correction, as a logarithm, that one design teaches about all others: several times what the
 /// coarsest search's forces, off by a tenth, explain. Beyond it, the search does not know that design.
 const LARGEST_CORRECTION: f64 = 0.5;
 /// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
 const LEAST_CORE_MM: f64 = 1.0;
+/// Weight of the excess over the end of a range beside that over a limit: where no design meets every limit, the one
+/// that breaks them least is to be within the ranges.
+const FIRM: f64 = 1e3;
+/// Ranges of what whole layers and turns give, by key.
+const RANGES: [&str; 2] = ["search.coil.outer_diameter_mm", "search.coil.length_mm"];
 /// Distance of the magnet's centre from the core's top, mm, beside which a millimetre counts.
 const ROOM_MM: f64 = 10.0;
 
@@ -338,15 +371,19 @@ impl<'a> ArrayProblem<'a> {
         Some(self.judged(Some(&physical), &self.bounds(&sample.x, Some(&physical))))
     }
 
-    /// The best sample of a search with these properties: of those that meet the limits, or that breaks them least.
+    /// The best sample of a search with these properties: of those that meet the limits, or that breaks them least
+    /// within the ranges of the search, as far as there is one.
     #[must_use]
     pub fn best<'s>(&self, search: &'s Search<'_>) -> Option<(&'s Sample, Judged)> {
-        let samples = search.samples().iter();
-        let judged = samples.filter_map(|sample| Some((sample, self.judged_sample(sample)?)));
-        let rank = |judged: &Judged| (judged.excess() <= MET, judged.merit());
-        judged
-            .filter(|(_, judged)| judged.merit().is_finite())
-            .reduce(|a, b| if rank(&b.1) > rank(&a.1) { b } else { a })
+        let ranked = search.samples().iter().filter_map(|sample| {
+            let physical = self.properties(sample)?;
+            let bounds = self.bounds(&sample.x, Some(&physical));
+            let judged = self.judged(Some(&physical), &bounds);
+            let rank = (judged.excess() <= MET, in_ranges(&bounds), judged.merit());
+            rank.2.is_finite().then_some((rank, sample, judged))
+        });
+        let best = ranked.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        best.map(|(_, sample, judged)| (sample, judged))
     }
 
     /// The variables of a design as it is made: lengths rounded, to the other side where the nearer one breaks a limit
@@ -432,6 +469,9 @@ impl<'a> ArrayProblem<'a> {
         add_plate(&design, &mut all);
         self.add_height(x, &mut all);
         all.retain(|bound| !self.left_out.contains(&bound.key));
+        for bound in &mut all {
+            bound.margin = self.margin(x, bound);
+        }
         all
     }
 
@@ -493,16 +533,17 @@ impl<'a> ArrayProblem<'a> {
         }
         let [outer, length] = [coil.outer_diameter_m, coil.length_m].map(|m| m * 1e3);
         let ranges = [
-            ("search.coil.outer_diameter_mm", outer, self.space.outer_mm),
-            ("search.coil.length_mm", length, self.space.length_mm),
+            (RANGES[0], outer, self.space.outer_mm),
+            (RANGES[1], length, self.space.length_mm),
         ];
-        // Whole lengths of wire are exact up to rounding.
         let slack = MARGIN + ROUNDING;
         for (key, value, [low, high]) in ranges {
-            all.push(Bounded::at_most(key, value, high * (1.0 + slack)));
-            if low > 0.0 {
-                all.push(Bounded::at_least(key, value, low * (1.0 - slack)));
-            }
+            let ends = [
+                Bounded::at_most(key, value, high),
+                Bounded::at_least(key, value, low),
+            ];
+            let ends = ends.into_iter().filter(|end| end.limit > 0.0);
+            all.extend(ends.map(|end| Bounded { slack, ..end }));
         }
         if design.limits.inner_diameter_min_m.is_none() {
             let bobbin_m = bobbin_bore_m(design.wire.diameter_m);
@@ -547,27 +588,29 @@ impl<'a> ArrayProblem<'a> {
         }));
     }
 
-    /// By how much a search must stay below a limit, or above it.
-    fn margin(&self, bound: &Bounded) -> f64 {
+    /// By how much the search must stay below a limit of the design at `x`, or above it.
+    fn margin(&self, x: &[f64], bound: &Bounded) -> f64 {
         let space = &self.space;
         let made_exactly = bound.scale.is_some() || bound.name == Some(LimitName::Pitch);
-        match bound.name {
-            // What is not rounded, or is rounded to the right side, may be at its limit.
-            _ if !space.is_wound()
-                && !space.varies_plate()
-                && (made_exactly || !space.rounds()) =>
-            {
-                MET
-            }
-            // Whole wires meet it exactly.
-            Some(LimitName::Length) => -ROUNDING,
-            _ => MARGIN,
+        // Ranges have their slack.
+        if bound.ends_range() {
+            return MARGIN;
         }
-    }
-
-    /// Whether the search takes a design for one that breaks this limit.
-    pub(super) fn breaks(&self, bound: &Bounded) -> bool {
-        bound.excess() + self.margin(bound) > MET
+        // What is not rounded, or is rounded to the right side, may be at its limit.
+        if !space.is_wound() && !space.varies_plate() && (made_exactly || !space.rounds()) {
+            return MET;
+        }
+        let decides = |axis: Axis| match bound.name {
+            Some(LimitName::Length) => axis == Axis::TurnsPerLayer,
+            Some(LimitName::OuterDiameter) => matches!(axis, Axis::Bore | Axis::Layers),
+            Some(LimitName::InnerDiameter) => axis == Axis::Bore,
+            Some(LimitName::Pitch | LimitName::Footprint) => matches!(
+                axis,
+                Axis::Bore | Axis::Layers | Axis::Plate(_) | Axis::Pitch | Axis::Move(_)
+            ),
+            _ => true,
+        };
+        EXACT + space.rounding(x, decides) * (MARGIN - EXACT)
     }
 
     /// Objective and limits from bounds that are known.
@@ -575,10 +618,7 @@ impl<'a> ArrayProblem<'a> {
     pub fn judged(&self, physical: Option<&Physical>, bounds: &[Bounded]) -> Judged {
         Judged {
             objectives: self.objectives(physical),
-            limits: bounds
-                .iter()
-                .map(|bound| bound.excess() + self.margin(bound))
-                .collect(),
+            limits: bounds.iter().map(Bounded::judged).collect(),
         }
     }
 
@@ -587,6 +627,12 @@ impl<'a> ArrayProblem<'a> {
     pub fn index(&self, axis: Axis) -> Option<usize> {
         self.space.axes().iter().position(|known| *known == axis)
     }
+}
+
+/// Whether what whole layers and turns give is within the ranges of the search.
+pub(super) fn in_ranges(bounds: &[Bounded]) -> bool {
+    let mut ends = bounds.iter().filter(|bound| bound.ends_range());
+    ends.all(Bounded::is_met)
 }
 
 /// By how much the logarithms of outputs at full accuracy are above those of the search.

@@ -8,7 +8,7 @@ use fluxform_base::progress::{Interrupted, interruptible, to_its_end};
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Search, Settings};
 
-use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room};
+use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges};
 use super::space::{Choice, Space, choices};
 use crate::limits::LimitName;
 
@@ -74,10 +74,10 @@ impl Candidate {
         self.bounds.iter().all(Bounded::is_met)
     }
 
-    /// The larger, the better: whether it meets every limit, then its merit.
-    fn rank(&self, problem: &ArrayProblem) -> (bool, f64) {
+    /// The larger, the better: whether it meets every limit, whether it is in the search's ranges, then its merit.
+    fn rank(&self, problem: &ArrayProblem) -> (bool, bool, f64) {
         let judged = problem.judged(Some(&self.physical), &self.bounds);
-        (self.is_feasible(), judged.merit())
+        (self.is_feasible(), in_ranges(&self.bounds), judged.merit())
     }
 
     /// The design at `x` to full accuracy.
@@ -214,7 +214,7 @@ impl Found<'_> {
             .problem
             .best(&self.search)
             .filter(|(_, judged)| judged.excess() <= MET);
-        if since.is_none_or(|(_, judged)| judged.merit() <= known.1 + WORTH) {
+        if since.is_none_or(|(_, judged)| judged.merit() <= known.2 + WORTH) {
             return Ok(false);
         }
         let before = self.search.samples().len();
@@ -295,7 +295,7 @@ fn problem<'a>(
         .map(|(axis, x)| format!("{} = {}", axis.key(), short(*x)))
         .collect();
     let bounds = problem.bounds(&x, None);
-    let broken = bounds.iter().filter(|bound| problem.breaks(bound));
+    let broken = bounds.iter().filter(|bound| bound.is_broken());
     let broken: Vec<String> = broken
         .map(|bound| format!("{} {}", label(bound), in_unit(bound, bound.value)))
         .collect();

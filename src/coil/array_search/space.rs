@@ -586,6 +586,20 @@ impl Space {
         variables.any(|variable| matches!(variable.values, Values::Continuous))
     }
 
+    /// How much of a micrometre the lengths that `decides` names may change where they are made: those at an end of their
+    /// range stay there.
+    pub(super) fn rounding(&self, x: &[f64], decides: impl Fn(Axis) -> bool) -> f64 {
+        let variables = x.iter().zip(&self.variables).zip(&self.axes);
+        let rounded = variables.filter(|((_, variable), axis)| {
+            matches!(variable.values, Values::Continuous) && decides(**axis)
+        });
+        let from_end = rounded.map(|((x, variable), axis)| {
+            let nearest = (x - variable.low).min(variable.high - x);
+            (nearest / made_step_mm(axis)).clamp(0.0, 1.0)
+        });
+        from_end.fold(0.0, f64::max)
+    }
+
     /// Bore, outer diameter, length and turns of the winding, mm; layers and turns may be fractions.
     fn winding_mm(&self, x: &[f64]) -> [f64; 4] {
         let bore = self.value(x, Axis::Bore).unwrap_or(self.bore_mm);

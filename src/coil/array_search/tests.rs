@@ -5,7 +5,7 @@ use std::path::Path;
 
 use fluxform_base::progress::Interrupted;
 use fluxform_design::{Design, Need};
-use fluxform_numerics::mixed_search::Settings;
+use fluxform_numerics::mixed_search::{MET, Settings};
 
 use super::problem::{Level, Objective, Physical, Physics, Room};
 use super::search::{Found, Request, problems, run};
@@ -499,4 +499,25 @@ fn regression_a_limit_was_worth_several_times_what_more_of_it_gave() {
             );
         }
     }
+}
+
+/// Layers that fill a limit exactly at the least bore of a range were kept from it by the rounding of that bore, which
+/// an end of a range does not take.
+#[test]
+fn regression_a_coil_at_the_outer_diameter_limit_was_refused() {
+    let is_met = |bores_mm: &str, bore_mm: f64| {
+        let search = format!(
+            "[search]\ncoil.inner_diameter_mm = {bores_mm}\ncoil.outer_diameter_mm = [25.0, 38.0]\n\
+             coil.length_mm = [3.0, 100.0]\n"
+        );
+        let all = problems(&design(&search), &request(), &[1.0], &OnAxis).expect("a search");
+        // 14 layers of 0.7 mm are 19.6 mm.
+        let bounds = all[0].bounds(&[bore_mm, 14.0, 50.0], None);
+        all[0].judged(None, &bounds).excess() <= MET
+    };
+    assert!(is_met("[18.4, 36.0]", 18.4));
+    assert!(is_met("[12.0, 18.4, 20.0]", 18.4));
+    assert!(!is_met("[12.0, 18.5, 20.0]", 18.5));
+    assert!(!is_met("[18.0, 36.0]", 18.4), "rounded where it is made");
+    assert!(is_met("[18.0, 36.0]", 18.398));
 }

@@ -150,13 +150,16 @@ impl ArrayFlags {
         let seconds = bar.take_seconds();
         drop(physics);
         drop(bar);
-        let status = self.give(shared, &outputs, ended, &arrays, &seconds, printer)?;
+        let (status, missed) = self.give(shared, &outputs, ended, &arrays, &seconds, printer)?;
         match status {
             ArrayEnding::Done => Ok(()),
             ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),
             ArrayEnding::Infeasible => Err(Failure::Unmet(
                 Wish::Coil,
-                "no array that was computed meets every limit; the result is the one that breaks them least".to_owned(),
+                format!(
+                    "no array that was computed meets every limit; the result, which breaks them least, misses: {}",
+                    missed.join(", ")
+                ),
             )),
         }
     }
@@ -195,7 +198,7 @@ impl ArrayFlags {
     }
 
     /// Gives the result, and the journal also where there is none. A journal that cannot be written costs no
-    /// result: it is reported in the end.
+    /// result: it is reported in the end. Returns how the search ended, and the limits that are missed.
     fn give(
         &self,
         shared: &Shared<'_>,
@@ -204,7 +207,7 @@ impl ArrayFlags {
         arrays: &Journal,
         seconds: &[(String, f64)],
         printer: &Printer,
-    ) -> Result<ArrayEnding, Failure> {
+    ) -> Result<(ArrayEnding, Vec<String>), Failure> {
         for warning in ended.iter().flat_map(|result| &result.warnings) {
             printer.warning(warning);
         }
@@ -236,7 +239,7 @@ impl ArrayFlags {
         }
         given?;
         let result = ended?;
-        kept.map(|_| result.status)
+        kept.map(|_| (result.status, result.missed()))
     }
 
     /// Every file that will be written, checked before the search.

@@ -304,20 +304,21 @@ struct Checked {
     met: bool,
 }
 
-/// Checks what `best` and the given design are limited to; `properties` are theirs. What both miss alike, because
-/// nothing that is searched changes it, is a warning.
+/// Checks what `best` and the given design are limited to, and which ranges of the search the best one misses. What
+/// both miss alike, because nothing that is searched changes it, is a warning.
 fn checked(
     [best, given]: [&Design; 2],
-    properties: [&Physical; 2],
+    (found, properties_given): (&Candidate, &Physical),
     tolerance: Option<f64>,
     warnings: &mut Vec<String>,
 ) -> Result<Checked, RunError> {
     let evaluation = evaluate(best, Vec::new(), tolerance)?;
     warnings.extend(evaluation.warnings);
     let mut limits = evaluation.limits;
-    limits.extend(checks_of_shapes(best, properties[0]));
+    limits.extend(checks_of_shapes(best, &found.physical));
+    limits.extend(missed_ranges(found));
     let mut limits_given = evaluate(given, Vec::new(), tolerance)?.limits;
-    limits_given.extend(checks_of_shapes(given, properties[1]));
+    limits_given.extend(checks_of_shapes(given, properties_given));
     let missed = limits.iter().filter(|(_, check)| !check.met);
     let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
         (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
@@ -342,7 +343,8 @@ fn certificate(found: &Found<'_>, bound: Option<PitchBound>, gain: f64) -> Array
     let search = &found.search;
     let objective = |x: &Vec<f64>| {
         let sample = search.samples().iter().find(|sample| sample.x == *x)?;
-        Some(found.problem.judged_sample(sample)?.objective().exp())
+        let judged = found.problem.judged_sample(sample)?;
+        (judged.excess() <= MET).then(|| judged.objective().exp())
     };
     ArrayCertificate {
         kind: match bound {
@@ -394,7 +396,8 @@ fn result(
         if constant == Constant::Static(Criterion::Saturation) {
             warnings.extend(past_rendering(found, shapes, physics)?);
         }
-        checked(designs, [physical, given], request.tolerance, &mut warnings)?
+        let of = (&found.best, given);
+        checked(designs, of, request.tolerance, &mut warnings)?
     };
     let status = match (found.interrupted, checked.met) {
         (true, _) => ArrayEnding::Interrupted,
@@ -472,6 +475,20 @@ fn checks_of_shapes(design: &Design, physical: &Physical) -> Vec<(&'static str, 
     of_shapes
         .filter_map(|row| Some((row.key, *checks.get(row.key)?)))
         .collect()
+}
+
+/// The ends of the search's ranges that `best` misses.
+fn missed_ranges(best: &Candidate) -> impl Iterator<Item = (&'static str, LimitCheck)> {
+    let bounds = best.bounds.iter();
+    let missed = bounds.filter(|bound| bound.ends_range() && !bound.is_met());
+    missed.map(|bound| {
+        let check = LimitCheck {
+            value: bound.value,
+            limit: bound.limit,
+            met: false,
+        };
+        (bound.key, check)
+    })
 }
 
 /// The gains that were larger than all before them, of arrays that meet every limit.

@@ -11,6 +11,7 @@ use crate::coil::array_search::search::SearchedChoice;
 use crate::coil::array_search::study::Study;
 use crate::coil::limits::LimitCheck;
 use crate::plot::array::ArrayPlot;
+use crate::report::limits::label;
 
 /// The result; all SI.
 #[derive(Debug, Clone, Serialize)]
@@ -38,11 +39,12 @@ pub struct ArrayOptimization {
     pub shapes: Vec<ShapeGain>,
     /// The variables of the best array by key, in the key's unit.
     pub values: BTreeMap<String, f64>,
-    /// The design's limits as `evaluate` has them, for the best array.
+    /// The design's limits as `evaluate` has them, for the best array, and the ends of `[search]` that it misses, in the
+    /// unit of their key.
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// The same for the given design.
     pub limits_given: BTreeMap<&'static str, LimitCheck>,
-    /// Whether `evaluate` finds every limit met.
+    /// Whether all of these are met.
     pub limits_met: bool,
     /// The surroundings of the best array; absent where the run was interrupted.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,6 +71,15 @@ pub struct ArrayOptimization {
     /// Warnings for the user.
     #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+impl ArrayOptimization {
+    /// Names of the limits that the best array misses.
+    #[must_use]
+    pub fn missed(&self) -> Vec<String> {
+        let missed = self.limits.iter().filter(|(_, check)| !check.met);
+        missed.map(|(key, _)| label(key)).collect()
+    }
 }
 
 /// A gain that was larger than all before it.
@@ -121,7 +132,7 @@ pub struct ArrayCertificate {
     pub kind: CertificateKind,
     /// Descents that came to their end.
     pub starts: usize,
-    /// The objective at the end of each.
+    /// The objective at the end of each that meets every limit.
     pub ends: Vec<f64>,
     /// No array of the search gains more; null where nothing is proven.
     pub upper_bound: Option<f64>,

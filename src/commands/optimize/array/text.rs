@@ -9,6 +9,7 @@ use crate::cli::quantity::{count, number, percent, si};
 use crate::cli::values::FileArgument;
 use crate::coil::array_search::study::Study;
 use crate::coil::array_search::worth::LimitWorth;
+use crate::coil::limits::by_key;
 
 pub fn summary(
     result: &ArrayOptimization,
@@ -170,7 +171,12 @@ fn limits(result: &ArrayOptimization) -> String {
         let state = if check.met { "met" } else { "missed" };
         let before = result.limits_given.get(key).filter(|check| !check.met);
         let state = before.map_or_else(|| state.to_owned(), |_| format!("{state}, missed before"));
-        limit_row(key, check.value, check.limit, &state)
+        let mut row = limit_row(key, check.value, check.limit, &state);
+        // The lower end of a range: those that are missed alone are listed.
+        if by_key(key).is_none() && !check.met && check.value < check.limit {
+            row[2] = row[2].replace("<=", ">=");
+        }
+        row
     });
     table("lrrl", &rows.collect::<Vec<_>>())
 }
