@@ -65,9 +65,9 @@ impl Faces {
 
     /// What of the surface over a rectangle lies above a level; `None` where nothing does, or too many faces do.
     pub(crate) fn above(&self, rect: &Rect, among: &[u32], level_m: f64) -> Option<Standing> {
-        let pieces = self.pieces(rect, among, level_m);
-        let pieces = pieces.map(|(face, piece)| piece.cut(|p| face.height(p) - level_m));
-        let pieces: Vec<Polygon> = (pieces.take(MOST_PIECES + 1))
+        let pieces = self.pieces(rect, among, level_m).take(MOST_PIECES + 1);
+        let pieces: Vec<Polygon> = pieces
+            .map(|(_, piece)| piece)
             .filter(|piece| piece.width() > self.hair.plan_m)
             .collect();
         if pieces.is_empty() || pieces.len() > MOST_PIECES {
@@ -76,7 +76,13 @@ impl Faces {
         Standing::of(&pieces, area_m2(&pieces))
     }
 
-    /// The faces that reach above a level, with their pieces over a rectangle.
+    /// No less than the area of what lies above a level: faces over each other count each, m^2.
+    pub(crate) fn above_m2(&self, rect: &Rect, among: &[u32], level_m: f64) -> f64 {
+        let pieces = self.pieces(rect, among, level_m);
+        pieces.map(|(_, piece)| piece.area()).sum()
+    }
+
+    /// The faces that reach above a level, with the pieces of them over a rectangle that do.
     fn pieces<'a>(
         &'a self,
         rect: &'a Rect,
@@ -85,17 +91,36 @@ impl Faces {
     ) -> impl Iterator<Item = (&'a Face, Polygon)> + 'a {
         let faces = among.iter().map(|face| &self.list[*face as usize]);
         let reaching = faces.filter(move |face| face.heights[1] > level_m);
-        reaching
-            .map(|face| (face, face.within(rect)))
-            .filter(|(_, piece)| piece.width() > self.hair.plan_m)
+        reaching.map(move |face| {
+            let piece = face.within(rect);
+            match face.heights[0] >= level_m {
+                true => (face, piece),
+                false => (face, piece.cut(|p| face.height(p) - level_m)),
+            }
+        })
+    }
+
+    /// Whether a patch is surpassed by more than `by_m`.
+    pub(crate) fn rises(&self, patch: &Patch, among: &[u32], by_m: f64) -> bool {
+        self.rising(patch, among, by_m).next().is_some()
     }
 
     /// The area over which the surface lies below a patch by more than `by_m`, or has gaps, m^2: what no face covers that
     /// lies higher somewhere.
     pub(crate) fn fallen_m2(&self, patch: &Patch, among: &[u32], by_m: f64) -> f64 {
-        let pieces: Vec<Polygon> = (self.rising(patch, among, -by_m))
-            .map(|(piece, _)| piece)
-            .collect();
+        let pieces = among.iter().filter_map(|face| {
+            let face = &self.list[*face as usize];
+            let [above_m, below_m] = face.most_off_m(&patch.rect, patch, self.hair);
+            let piece = (above_m > -by_m).then(|| face.within(&patch.rect))?;
+            let reaches = || {
+                piece
+                    .supremum(|p| face.height(p) - patch.height_m(p))
+                    .value_m
+                    > -by_m
+            };
+            (below_m <= by_m || reaches()).then_some(piece)
+        });
+        let pieces: Vec<Polygon> = pieces.collect();
         let [width, depth] = patch.rect.sides();
         let sum_m2: f64 = pieces.iter().map(Polygon::area).sum();
         // No more than all: nothing is covered twice.

@@ -13,7 +13,7 @@ use fluxform_numerics::axis::Axis;
 /// its area.
 const SMOOTH_PART: f64 = 5e-4;
 /// So many times at most: departures of a texture have one sign in many parts.
-const MOST_WIDENED: f64 = 4.0;
+const MOST_WIDENED: f64 = 16.0;
 /// The share of a part at most that lies between a quarter and three quarters of its height where it jumps.
 const SLOPING: f64 = 0.25;
 /// Bisections of a side of a part: to 4e-3 of it.
@@ -242,7 +242,7 @@ impl Quarters<'_> {
         self.faces
             .zip(square.patch())
             .is_some_and(|(faces, patch)| {
-                faces.rise_m(&patch, members) > by_m || faces.fallen_m2(&patch, members, by_m) > 0.0
+                faces.rises(&patch, members, by_m) || faces.fallen_m2(&patch, members, by_m) > 0.0
             })
     }
 
@@ -251,7 +251,7 @@ impl Quarters<'_> {
     fn levels(&mut self, square: &Square) -> Option<[Part; 2]> {
         let (faces, patch) = (self.faces?, square.patch()?);
         let by_m = SMOOTH_PART * square.mean_m();
-        let rises = faces.rise_m(&patch, &square.members) > by_m;
+        let rises = faces.rises(&patch, &square.members, by_m);
         if !rises && faces.fallen_m2(&patch, &square.members, by_m) <= 0.0 {
             return None;
         }
@@ -264,19 +264,16 @@ impl Quarters<'_> {
         let seen = middle.into_iter().chain(fallen).chain(corners);
         let (low_at, low_m) = seen.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let high_m = faces.highest_m(&square.rect, &square.members)?;
-        let above = |part: f64| {
-            let level_m = low_m + part * (high_m - low_m);
-            faces.above(&square.rect, &square.members, level_m)
-        };
-        let (most, half, least) = (above(0.25)?, above(0.5)?, above(0.75)?);
+        let level_m = |part: f64| low_m + part * (high_m - low_m);
+        let above_m2 = |part| faces.above_m2(&square.rect, &square.members, level_m(part));
         let [width, depth] = square.rect.sides();
-        if high_m - low_m <= by_m || most.area_m2 - least.area_m2 > SLOPING * width * depth {
+        if high_m - low_m <= by_m || above_m2(0.25) - above_m2(0.75) > SLOPING * width * depth {
             return None;
         }
+        let half = faces.above(&square.rect, &square.members, level_m(0.5))?;
         let high = Part::of(half, self.look(half.at_m)?);
-        let level_m = 0.5 * (low_m + high_m);
         let (at_m, height_m) = middle
-            .filter(|at| at.1 < level_m)
+            .filter(|at| at.1 < level_m(0.5))
             .unwrap_or((low_at, low_m));
         let low = Part {
             at_m,
