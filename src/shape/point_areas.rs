@@ -422,10 +422,11 @@ fn broken_cells(
                 let off = |height: f64| ((height - mean) / mean).abs();
                 let between = surface.rise_m(cell) / mean;
                 let departs = (surface.height_m)(middle).map_or(0.0, off).max(between);
-                match departs <= SMOOTH && surface.falls(cell, SMOOTH * mean) {
-                    true => 1.0,
-                    false => departs,
+                if departs <= SMOOTH && surface.falls(cell, SMOOTH * mean) {
+                    // By how much is not asked for.
+                    return 2.0 * SMOOTH;
                 }
+                departs
             }
             _ => f64::INFINITY,
         }

@@ -348,10 +348,10 @@ fn regression_heights_that_samples_below_the_grid_do_not_have_were_not_counted()
     }
 }
 
-/// A strip between skipped points, too narrow for any comparison, had an error that is no number: the page said NaN, and
-/// JSON and bundle blamed the disk.
+/// The stated error of a strip between skipped points, too narrow for any comparison, was NaN: JSON and bundle failed, and
+/// the message blamed the disk.
 #[test]
-fn regression_a_strip_too_narrow_to_compare_had_an_error_that_is_no_number() {
+fn regression_the_error_of_a_strip_too_narrow_to_compare_was_nan() {
     let place = Place::new();
     let grid = "[points]\nx_mm = [-60, 0, 3]\ny_mm = [-30, 30, 5]\noutside = \"skip\"\n";
     let text = format!("primitive = \"flat\"\nside_mm = 60\nheight_mm = 50\n{grid}");
