@@ -118,14 +118,15 @@ impl Circuit {
             .unwrap_or_else(|| self.settling_s())
     }
 
-    /// Time until the part `left` of a step to `current_a` is left under a current loop, s; `None`
-    /// where drivers set voltages.
+    /// Time until the part `left` of a step to `current_a`, of either sign, is left under a current loop,
+    /// s; `None` where drivers set voltages.
     #[must_use]
     pub fn step_s(&self, supply: &Supply, current_a: f64, left: f64) -> Option<f64> {
         match supply.driver {
             Driver::Voltage => return None,
             Driver::Current => {}
         }
+        let current_a = current_a.abs();
         let pace = std::f64::consts::TAU * supply.bandwidth_hz;
         let (inductive, most_a) = (
             self.inductance_h * pace,
@@ -143,7 +144,7 @@ impl Circuit {
             0.0
         };
         let rise_s = |until_a: f64| -self.time_constant_s() * (-until_a / most_a).ln_1p();
-        if current_a <= 0.0 {
+        if current_a == 0.0 {
             return Some(0.0);
         }
         Some(if taken_a >= goal_a {
@@ -159,13 +160,46 @@ impl Circuit {
         self.resistance_ohm * current_a * current_a
     }
 
-    /// The current that `limit_a` and the supply's voltage over the resistance allow, A.
+    /// A current limit of either sign, as far as the supply's voltage over the resistance allows, A.
     #[must_use]
-    pub fn rated_current_a(&self, limit_a: f64, voltage_v: Option<f64>) -> f64 {
+    pub fn reached_a(&self, limit_a: f64, voltage_v: Option<f64>) -> f64 {
         voltage_v.map_or(limit_a, |voltage_v| {
-            limit_a.min(voltage_v / self.resistance_ohm)
+            let most_a = voltage_v / self.resistance_ohm;
+            limit_a.min(most_a).max(-most_a)
         })
     }
+
+    /// The rated current of each coil, A: of its two limits, as far as the voltage allows, the one
+    /// farther from zero; of two alike the upper one.
+    #[must_use]
+    pub fn rated_currents_a(&self, supply: &Supply) -> Vec<f64> {
+        let limits_a = supply.current_max_a.iter().zip(&supply.current_min_a);
+        limits_a
+            .map(|(upper, lower)| {
+                let both = [upper, lower].map(|limit| self.reached_a(*limit, supply.voltage_v));
+                farthest_from_zero(both)
+            })
+            .collect()
+    }
+
+    /// The largest of the coils' rated currents in either direction, with its sign, A.
+    #[must_use]
+    pub fn rated_current_a(&self, supply: &Supply) -> f64 {
+        farthest_from_zero(self.rated_currents_a(supply))
+    }
+}
+
+/// The current farthest from zero, a positive one of two alike; 0 of none.
+pub(crate) fn farthest_from_zero(currents_a: impl IntoIterator<Item = f64>) -> f64 {
+    let farther = |most: f64, next: f64| {
+        let alike = next.abs() == most.abs();
+        if next.abs() > most.abs() || (alike && next > most) {
+            next
+        } else {
+            most
+        }
+    };
+    currents_a.into_iter().fold(0.0, farther)
 }
 
 #[cfg(test)]
@@ -213,11 +247,8 @@ mod tests {
         let warm = Circuit::of_air_coil(&coil, &wire);
         let expected = 1.0 + 3.93e-3 * 63.0;
         assert!((warm.resistance_ohm / cold.resistance_ohm - expected).abs() < 1e-14);
-        assert_eq!(cold.rated_current_a(2.0, Some(36.0)), 2.0);
-        assert_eq!(
-            cold.rated_current_a(2.0, Some(6.0)),
-            6.0 / cold.resistance_ohm
-        );
+        assert_eq!(cold.reached_a(2.0, Some(36.0)), 2.0);
+        assert_eq!(cold.reached_a(2.0, Some(6.0)), 6.0 / cold.resistance_ohm);
     }
 
     /// Closed forms: all slew, all loop, and the voltage's own exponential where it has no headroom.

@@ -187,8 +187,7 @@ impl Evaluated<'_> {
     /// Time until a step to the rated current has settled, s.
     fn settling_s(&self, inductance_h: f64) -> f64 {
         let supply = &self.design.supply;
-        let most_a = supply.current_max_a.iter().copied().fold(0.0, f64::max);
-        let current_a = self.circuit.rated_current_a(most_a, supply.voltage_v);
+        let current_a = self.circuit.rated_current_a(supply);
         let circuit = Circuit {
             inductance_h,
             ..*self.circuit

@@ -40,7 +40,7 @@ pub struct FieldSlice {
     pub field_t: Vec<Option<[f64; 3]>>,
 }
 
-/// The field of `design` at the largest current of every coil, as a drawing with field lines; `None`
+/// The field of `design` at the rated current of every coil, as a drawing with field lines; `None`
 /// without a coil.
 ///
 /// # Errors
@@ -54,7 +54,8 @@ pub fn picture(design: &Design, progress: &dyn Progress) -> Result<Option<Slices
         return Ok(None);
     };
     let solved = solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
-    let state = WorkingPoint::new(&scene, &solved, &scene.upper_a, f64::NEG_INFINITY)?;
+    let rated_a = scene.rated_currents_a();
+    let state = WorkingPoint::new(&scene, &solved, &rated_a, f64::NEG_INFINITY)?;
     let y_m = array.section_y_m;
     let around = array.section_ends_m();
     let margin_m = MARGIN
@@ -74,7 +75,7 @@ pub fn picture(design: &Design, progress: &dyn Progress) -> Result<Option<Slices
     let size = |field: &[f64; 3]| field.iter().map(|part| part * part).sum::<f64>().sqrt();
     Ok(Some(SlicesPlot {
         title: format!(
-            "{}: field with every coil at its largest current{}",
+            "{}: field with every coil at its rated current{}",
             design.name,
             if state.is_some() {
                 ", along the B-H curve"
@@ -98,7 +99,7 @@ pub fn picture(design: &Design, progress: &dyn Progress) -> Result<Option<Slices
 }
 
 impl FieldSlice {
-    /// At the largest current of every coil; of steel in the `state` there, if it has one, else linear.
+    /// At the rated current of every coil; of steel in the `state` there, if it has one, else linear.
     ///
     /// # Errors
     /// Interruption.
@@ -118,7 +119,7 @@ impl FieldSlice {
         };
         let cells = (0..counts[1]).flat_map(|row| (0..counts[0]).map(move |column| [column, row]));
         let places_m: Vec<[f64; 3]> = cells.map(|[x, z]| [at(0, x), y_m, at(1, z)]).collect();
-        let mut field_t = windings_t(scene, &places_m, &scene.upper_a, progress)?;
+        let mut field_t = windings_t(scene, &places_m, &scene.rated_currents_a(), progress)?;
         if solved.has_steel() {
             add_steel(scene, solved, state, &places_m, &mut field_t);
         }
@@ -222,7 +223,7 @@ fn add_steel(
             groups.entry(step as i32).or_default().push(number);
         }
     }
-    let driven = scene.coils.iter().zip(&scene.upper_a);
+    let driven = scene.coils.iter().zip(scene.rated_currents_a());
     let driven: Vec<f64> = driven.map(|(coil, current)| coil.gain * current).collect();
     let parts = Components::All;
     for (step, numbers) in groups {

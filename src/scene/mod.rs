@@ -190,9 +190,14 @@ impl<'a> Scene<'a> {
             })
             .collect();
         let voltage_v = design.supply.voltage_v;
-        let rated = |limit: &f64| circuit.rated_current_a(*limit, voltage_v);
-        let upper_a: Vec<f64> = design.supply.current_max_a.iter().map(rated).collect();
-        let tolerances = Tolerances::new(design, core.as_ref(), largest(&upper_a), requested);
+        let reached_a = |limits_a: &[f64]| -> Vec<f64> {
+            let limits_a = limits_a.iter();
+            limits_a
+                .map(|limit| circuit.reached_a(*limit, voltage_v))
+                .collect()
+        };
+        let has_current = circuit.rated_current_a(&design.supply) != 0.0;
+        let tolerances = Tolerances::new(design, core.as_ref(), has_current, requested);
         Ok(Self {
             design,
             coil,
@@ -202,13 +207,8 @@ impl<'a> Scene<'a> {
             iron,
             coils,
             moment_a_m2: moment_a_m2(design),
-            upper_a,
-            lower_a: design
-                .supply
-                .current_min_a
-                .iter()
-                .map(|l| -rated(&-l))
-                .collect(),
+            upper_a: reached_a(&design.supply.current_max_a),
+            lower_a: reached_a(&design.supply.current_min_a),
             circuit,
             tolerances,
             pulls: HeldPulls::default(),
@@ -218,9 +218,9 @@ impl<'a> Scene<'a> {
     /// The same scene, every stage to the accuracy that was `requested`, if any was.
     #[must_use]
     pub fn to_tolerance(&self, requested: Option<f64>) -> Self {
-        let rated_a = self.rated_current_a();
+        let has_current = self.rated_current_a() != 0.0;
         Self {
-            tolerances: Tolerances::new(self.design, self.core.as_ref(), rated_a, requested),
+            tolerances: Tolerances::new(self.design, self.core.as_ref(), has_current, requested),
             ..self.clone()
         }
     }
@@ -231,10 +231,16 @@ impl<'a> Scene<'a> {
         drawing::drawing(self.design, self.iron.iter().flat_map(SceneIron::irons))
     }
 
-    /// The rated current of one coil: the largest of the array's upper limits, A.
+    /// The rated current of each coil, A: [`Circuit::rated_currents_a`].
+    #[must_use]
+    pub fn rated_currents_a(&self) -> Vec<f64> {
+        self.circuit.rated_currents_a(&self.design.supply)
+    }
+
+    /// The rated current of one coil, A: [`Circuit::rated_current_a`].
     #[must_use]
     pub fn rated_current_a(&self) -> f64 {
-        largest(&self.upper_a)
+        self.circuit.rated_current_a(&self.design.supply)
     }
 
     /// How warm a coil alone in still air becomes under a current that stays.
@@ -576,10 +582,6 @@ pub fn coupled(design: &Design) -> bool {
         && !design.has_iron()
         && design.array.coupling == Coupling::Full
         && design.array.positions_m.len() > 1
-}
-
-fn largest(currents_a: &[f64]) -> f64 {
-    currents_a.iter().copied().fold(0.0, f64::max)
 }
 
 /// Unit vectors along a moment and across it.

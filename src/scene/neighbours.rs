@@ -194,7 +194,8 @@ fn array(
     accuracy.insert("mutual_inductance", stage);
     accuracy.extend(solved.linear_flux().map(|stage| (LINEAR_CORES, stage)));
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
-    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, lowest_m)? {
+    let rated_a = scene.rated_currents_a();
+    let working_point = match WorkingPoint::new(scene, &solved, &rated_a, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
             peak_t.clone_from(&point.peak_field_t);
@@ -205,7 +206,7 @@ fn array(
     };
     if let (Some(array), None) = (solved.steel().coupled(), &working_point) {
         let depth_m = peak_depth_m(array.response.outline.shape);
-        let inside = array.core_fields(&scene.upper_a, depth_m)?;
+        let inside = array.core_fields(&rated_a, depth_m)?;
         peak_t = inside.iter().map(|field| field.peak_t).collect();
         mean_t = inside.iter().map(|field| field.mean_t).collect();
         let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
@@ -218,7 +219,7 @@ fn array(
             FOR_CORES,
         ));
     }
-    let iron = match solved.iron_peaks(scene, &scene.upper_a)? {
+    let iron = match solved.iron_peaks(scene, &rated_a)? {
         Some(peaks) => {
             peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
             iron_summary(scene, slowest.settling_s(), &peaks, (accuracy, warnings))?

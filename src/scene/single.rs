@@ -141,7 +141,7 @@ impl Single {
             )));
         }
         if let Material::Curve(curve) = &core.material
-            && scene.rated_current_a() > 0.0
+            && scene.rated_current_a() != 0.0
         {
             return Self::saturated(scene, core, curve);
         }

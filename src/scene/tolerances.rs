@@ -124,17 +124,17 @@ pub struct Tolerances {
 }
 
 impl Tolerances {
-    /// Of `design`, whose core is `core` and whose coils have the rated current `rated_a`; all as
-    /// `requested` if the user did.
+    /// Of `design`, whose core is `core` and whose coils may have current or not; all as `requested`
+    /// if the user did.
     pub(super) fn new(
         design: &Design,
         core: Option<&SceneCore>,
-        rated_a: f64,
+        has_current: bool,
         requested: Option<f64>,
     ) -> Self {
         let of_core = |in_air: f64| match core.map(|core| &core.material) {
             None => in_air,
-            Some(Material::Curve(_)) if rated_a > 0.0 => SATURATED_TOLERANCE,
+            Some(Material::Curve(_)) if has_current => SATURATED_TOLERANCE,
             Some(Material::Curve(_) | Material::Linear(_)) => CORED_TOLERANCE,
         };
         let of_array = |in_air: f64| {

@@ -483,13 +483,7 @@ impl<'a> ArrayProblem<'a> {
     ) -> Option<T> {
         let inductance_h = physical.map_or(f64::NAN, |p| p.inductance_h);
         let (circuit, mass_kg) = Self::coil(design, inductance_h)?;
-        let most_a = design
-            .supply
-            .current_max_a
-            .iter()
-            .copied()
-            .fold(0.0, f64::max);
-        let rated_a = circuit.rated_current_a(most_a, design.supply.voltage_v);
+        let rated_a = circuit.rated_current_a(&design.supply);
         Some(of(&Evaluated {
             design,
             circuit: &circuit,

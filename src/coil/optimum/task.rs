@@ -6,6 +6,7 @@ use super::model::{CoilModel, Strand, Window};
 use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
 use crate::array_heat::Drivers;
+use crate::circuit::farthest_from_zero;
 use fluxform_design::{Coil, Core, Design, Driver, Steel};
 use fluxform_field::magnet::MagnetRule;
 
@@ -13,7 +14,9 @@ use fluxform_field::magnet::MagnetRule;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NoTask {
     /// The drivers give no current.
-    #[error("supply.current_max_a is zero: without current no coil exerts a force")]
+    #[error(
+        "supply.current_max_a and current_min_a are zero: without current no coil exerts a force"
+    )]
     NoCurrent,
     /// The supply gives no voltage.
     #[error("supply.voltage_v is zero: without current no coil exerts a force")]
@@ -38,19 +41,15 @@ pub enum NoTask {
 /// # Errors
 /// [`NoTask`].
 pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
-    let currents = &design.supply.current_max_a;
-    let current_max_a = currents.iter().copied().fold(0.0, f64::max);
-    if current_max_a <= 0.0 {
+    let supply = &design.supply;
+    let limits_a = supply.current_max_a.iter().chain(&supply.current_min_a);
+    let current_max_a = farthest_from_zero(limits_a.copied()).abs();
+    if current_max_a == 0.0 {
         return Err(NoTask::NoCurrent);
     }
-    if design
-        .supply
-        .voltage_v
-        .is_some_and(|voltage_v| voltage_v <= 0.0)
-    {
+    if supply.voltage_v.is_some_and(|voltage_v| voltage_v <= 0.0) {
         return Err(NoTask::NoVoltage);
     }
-    let supply = &design.supply;
     Ok(Task {
         limits: design.limits,
         fixed,

@@ -57,7 +57,7 @@ pub struct Evaluate {
     plot: Option<FileArgument>,
     /// Draw the field in that section, with field lines
     ///
-    /// With every coil at its largest current, along the B-H curve where there is one: |B| by its
+    /// With every coil at its rated current, along the B-H curve where there is one: |B| by its
     /// logarithm around the array, grey in and close to the surface of steel, and B_z over the workspace.
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot_field: Option<FileArgument>,

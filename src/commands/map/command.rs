@@ -77,7 +77,7 @@ pub struct Map {
     vtk: bool,
     /// Draw the force: slices, and over height (.svg, .png or .pdf)
     ///
-    /// With every coil at its largest current across at the target's height and upright through the middle
+    /// With every coil at its rated current across at the target's height and upright through the middle
     /// coil, zero white; and that of one ampere above each coil that has no equal. `-` is standard output.
     #[arg(long, value_name = "FILE", value_parser = values::picture)]
     plot: Option<FileArgument>,

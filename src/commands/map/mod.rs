@@ -256,7 +256,7 @@ pub fn run(
         &protected,
     )?;
     progress.end();
-    let picture = request.picture.then(|| picture(design, &arrays));
+    let picture = (request.picture).then(|| picture(design, &arrays, &scene.rated_currents_a()));
     drop(arrays);
     Ok(made.report(&scene, request, sidecar, picture))
 }
@@ -431,7 +431,8 @@ impl Together {
         request: &MapRequest,
         progress: &dyn Progress,
     ) -> Result<Option<Self>, RunError> {
-        let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
+        let rated_a = scene.rated_currents_a();
+        let currents_a = request.currents_a.as_deref().unwrap_or(&rated_a);
         progress.begin("working point", 1);
         let point = WorkingPoint::new(scene, solved, currents_a, lowest_m)?;
         let Some(point) = point else {

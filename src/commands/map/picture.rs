@@ -10,10 +10,10 @@ const ALIKE: f64 = 2e-3;
 /// Names of coils in a legend, at most; of more the number alone.
 const MOST_NAMED: usize = 4;
 
-/// Slices of the force on the magnet with every coil at its largest current, across at the target's
+/// Slices of the force on the magnet with every coil at its rated current, across at the target's
 /// height and upright through the middle coil; and the upward force of one ampere above each coil that
 /// has no equal. The upward force alone where the map holds no other.
-pub(super) fn picture(design: &Design, map: &MapArrays) -> SlicesPlot {
+pub(super) fn picture(design: &Design, map: &MapArrays, rated_a: &[f64]) -> SlicesPlot {
     let force = ForceMap::of_map(map);
     let [x, y, z] = [&*map.x_m, &*map.y_m, &*map.z_m];
     let axes_m = &design.array.positions_m;
@@ -26,7 +26,7 @@ pub(super) fn picture(design: &Design, map: &MapArrays) -> SlicesPlot {
     let across = y.iter().flat_map(|y| x.iter().map(|x| [*x, *y, height_m]));
     let upright = z.iter().flat_map(|z| x.iter().map(|x| [*x, section_m, *z]));
     let [across, upright] = [across.collect::<Vec<_>>(), upright.collect()]
-        .map(|places| forces_n(&force, &places, &map.runtime.current_max_a));
+        .map(|places| forces_n(&force, &places, rated_a));
     let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
     let planes = [
         (
@@ -63,7 +63,7 @@ pub(super) fn picture(design: &Design, map: &MapArrays) -> SlicesPlot {
     });
     SlicesPlot {
         title: format!(
-            "{}: force on the magnet with every coil at its largest current",
+            "{}: force on the magnet with every coil at its rated current",
             design.name
         ),
         slices: slices.collect(),
