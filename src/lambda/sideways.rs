@@ -1,5 +1,6 @@
 //! The sideways force that static currents and eq. 8 leave, and what three rows of eq. 8 change.
 
+use fluxform_numerics::quantile::quantile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -116,14 +117,11 @@ impl Given {
     }
 
     fn median_deg(&mut self) -> f64 {
-        let middle = self.angles_deg.len() / 2;
         if self.angles_deg.is_empty() {
             return 0.0;
         }
-        *self
-            .angles_deg
-            .select_nth_unstable_by(middle, f64::total_cmp)
-            .1
+        self.angles_deg.sort_unstable_by(f64::total_cmp);
+        quantile(&self.angles_deg, 0.5)
     }
 }
 

@@ -14,6 +14,7 @@
 //! distance, which is convex. The lower end, above zero only where a force without currents is too strong, is
 //! found likewise from below.
 
+use fluxform_numerics::quantile::quantile;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -507,9 +508,9 @@ impl Sums {
 
     fn rendering(mut self) -> VectorRendering {
         self.angles_deg.sort_by(f64::total_cmp);
-        let quantile = |part: f64| {
-            let at = (part * self.angles_deg.len() as f64) as usize;
-            self.angles_deg.get(at).copied().unwrap_or(0.0)
+        let angle_deg = |part: f64| match &self.angles_deg[..] {
+            [] => 0.0,
+            angles_deg => quantile(angles_deg, part),
         };
         // Nothing requested: no share of it.
         let share = |square: f64| {
@@ -525,8 +526,8 @@ impl Sums {
             worst_error_n: self.worst,
             error_share: share(error),
             sideways_share: share(self.sideways),
-            direction_median_deg: quantile(0.5),
-            direction_95_deg: quantile(0.95),
+            direction_median_deg: angle_deg(0.5),
+            direction_95_deg: angle_deg(0.95),
             reached: self.reached / self.weight,
             mean_power_w: self.power / self.weight,
             largest_current_a: self.largest,

@@ -27,6 +27,7 @@ pub mod mixed_search;
 pub mod nearest_triangle;
 pub mod qr;
 pub mod quadratic_program;
+pub mod quantile;
 pub mod random;
 pub mod real;
 pub mod refinement;

@@ -28,11 +28,11 @@ fn shares_angles_and_power_are_those_by_hand() {
     let fixed_x: [f64; 2] = [0.25, -0.3];
     let share = |x: [f64; 2]| ((x[0] * x[0] + 3.0 * x[1] * x[1]) / requested).sqrt();
     near(found.static_share, share(fixed_x));
-    // Up there are 0.5 N and 0.6 N; of two angles the larger is the median.
+    // Up there are 0.5 N and 0.6 N; of two angles the mean is the median: it was the larger one.
     let angles = [fixed_x[0].atan2(0.5), 0.3_f64.atan2(0.6)];
     near(
         found.static_median_deg,
-        angles[0].max(angles[1]).to_degrees(),
+        (0.5 * (angles[0] + angles[1])).to_degrees(),
     );
     // Least power: currents go as force over resistance.
     let least = |up: [f64; 2], force: f64| {

@@ -27,6 +27,7 @@ mod mixed_search_surrogate;
 mod nearest_triangle;
 mod qr;
 mod quadratic_program;
+mod quantile;
 mod random;
 mod real;
 mod refinement;

@@ -8,6 +8,8 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 
+use crate::numerics::quantile::quantile;
+
 /// How long a measurement may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -137,20 +139,11 @@ pub fn measure<T, E>(
     Ok((result, timing))
 }
 
-/// Lower quartile, median and upper quartile of `values`, which are sorted: between the order
-/// statistics at (n - 1) p, linearly; NaN without values.
+/// Lower quartile, median and upper quartile of `values`, which are sorted; NaN without values.
 #[must_use]
 pub fn quartiles(values: &mut [f64]) -> [f64; 3] {
     values.sort_unstable_by(f64::total_cmp);
-    [0.25, 0.5, 0.75].map(|part| {
-        let Some(last) = values.len().checked_sub(1) else {
-            return f64::NAN;
-        };
-        let at = part * last as f64;
-        let below = at.floor() as usize;
-        let above = (below + 1).min(last);
-        values[below] + (at - below as f64) * (values[above] - values[below])
-    })
+    [0.25, 0.5, 0.75].map(|part| quantile(values, part))
 }
 
 #[cfg(test)]
@@ -161,13 +154,5 @@ mod tests {
     fn an_error_ends_the_measurement() {
         let failed: Result<((), Timing), &str> = measure(&Effort::FULL, || Err("no"));
         assert_eq!(failed.unwrap_err(), "no");
-    }
-
-    #[test]
-    fn quartiles_interpolate_between_order_statistics() {
-        assert_eq!(quartiles(&mut [7.0, 1.0, 3.0, 5.0, 9.0]), [3.0, 5.0, 7.0]);
-        assert_eq!(quartiles(&mut [2.0, 1.0]), [1.25, 1.5, 1.75]);
-        assert_eq!(quartiles(&mut [1.3]), [1.3, 1.3, 1.3]);
-        assert!(quartiles(&mut []).iter().all(|q| q.is_nan()));
     }
 }
