@@ -93,8 +93,8 @@ pub fn announce(costs: &[Cost], printer: &Printer) -> Result<(), String> {
         within(cost)?;
         if let Some((error, tolerance)) = cost.misses {
             printer.notice(&format!(
-                "{} cannot be solved to the tolerance {tolerance:.0e}: its error will be {error:.0e} at \
-                 least, however long it takes; {}",
+                "{} will not reach the tolerance {tolerance:.0e}: the error that can be stated is {error:.0e} at \
+                 least; {}",
                 cost.what, cost.reduce
             ));
         }

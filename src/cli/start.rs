@@ -7,7 +7,7 @@ use super::bar::Bar;
 use super::failure::{Failure, Wish};
 use super::interrupt;
 use super::printer::{Printer, Stream};
-use super::values::FileArgument;
+use super::values::{FileArgument, TOLERANCE};
 use crate::RunError;
 use crate::bundle::atomic::{Overwrite, write};
 
@@ -63,8 +63,9 @@ pub fn accuracy_check(missed: &[String]) -> Result<(), Failure> {
     Err(Failure::Unmet(
         Wish::Accuracy,
         format!(
-            "the tolerance (--tolerance, or the default) was not reached by {}; the result itself is given, a larger --tolerance accepts it",
-            missed.join("; ")
+            "the tolerance (--tolerance, or the default) was not reached by {}; the result itself is given, a larger --tolerance, {} at most, accepts it",
+            missed.join("; "),
+            TOLERANCE.end()
         ),
     ))
 }

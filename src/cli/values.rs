@@ -47,7 +47,7 @@ fn possible<T: Choice>() -> impl Iterator<Item = PossibleValue> {
 /// Most threads that may be asked for.
 const THREADS_MAX: usize = 1024;
 /// Tolerances that make sense, relative.
-const TOLERANCE: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;
+pub const TOLERANCE: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;
 
 /// A file, or `-` for standard input or output.
 #[derive(Debug, Clone, PartialEq, Eq)]

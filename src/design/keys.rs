@@ -39,7 +39,10 @@ const MEANINGS: &[(&str, &str)] = &[
         "wire.conductor_diameter_mm",
         "of the bare conductor; without it `diameter_mm`",
     ),
-    ("wire.resistivity_ohm_m", "of the conductor at 20 C"),
+    (
+        "wire.resistivity_ohm_m",
+        "of the conductor at 20 C; its mass, its heat capacity and its change with temperature stay those of copper",
+    ),
     (
         "wire.temperature_c",
         "of the winding, for its resistance and heat",

@@ -356,7 +356,7 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
         what: format!("the steel of {} coupled cores", positions_m.len()),
         bytes: cost.bytes,
         cpu_seconds: cost.operations / OPERATIONS_PER_S,
-        reduce: "use fewer coils, shorter cores, a larger --tolerance, or coupling = \"none\"",
+        reduce: "use fewer coils, cores farther apart, a larger --tolerance, or coupling = \"none\"",
         misses: (cost.least_error > tolerance).then_some((cost.least_error, tolerance)),
     })
 }

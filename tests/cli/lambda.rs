@@ -620,7 +620,23 @@ fn compare_renders_the_constants_that_lambda_reports() {
     for (shape, of) in shapes.iter().zip(compared["shapes"].as_array().unwrap()) {
         let arguments = ["lambda", "designs/seed_air.toml", shape, "--format", "json"];
         let alone = place.run(&arguments).ends(0).json();
+        let error = |stage: &str| alone["accuracy"][stage]["estimate"].as_f64();
+        let stages = ["lambda_of_points", "lambda_of_heights"].map(error);
+        let expected: f64 = stages.iter().flatten().sum();
+        let stated = of["lambda_error"].as_f64().unwrap();
+        assert!(
+            expected > 0.0 && (stated / expected - 1.0).abs() < 1e-6,
+            "{of} {expected}"
+        );
         let [alone, of] = [&alone, of].map(|of| of["lambda_n_per_m"].as_f64().unwrap());
         assert!((of / alone - 1.0).abs() < 1e-8, "{shape}: {of} {alone}");
     }
+    // Regression: the error of the constants, which the grids leave uncertain, was in neither: 1e-10 was stated.
+    let difference = compared["accuracy"]["difference"]["estimate"].as_f64();
+    assert!(difference > Some(0.01), "{difference:?}");
+    let text = place.run(&arguments[..2].concat()).ends(0).out;
+    assert!(
+        text.contains("equal: lambda ") && text.contains(" +- "),
+        "{text}"
+    );
 }

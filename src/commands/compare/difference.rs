@@ -77,10 +77,15 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// First-order error of the largest, where each coil's force is wrong by `part` of itself.
+    /// First-order error of the largest, where each coil's force is wrong by `part` of itself and either object's by its
+    /// part of the `constants`.
     #[must_use]
-    pub fn error(&self, part: f64, jnd: f64) -> f64 {
-        part * (length(self.a.gross_n) + length(self.b.gross_n)) / scale_n(self.a, self.b, jnd)
+    pub fn error(&self, part: f64, constants: [f64; 2], jnd: f64) -> f64 {
+        let off_n = |felt: Felt, constant: f64| {
+            part * length(felt.gross_n) + constant * length(felt.force_n)
+        };
+        let [of_a, of_b] = constants;
+        (off_n(self.a, of_a) + off_n(self.b, of_b)) / scale_n(self.a, self.b, jnd)
     }
 }
 
@@ -153,7 +158,10 @@ mod tests {
         assert_eq!(found.felt_share, 0.75);
         assert_eq!(stronger(c[0], d[0], 0.07), found.largest);
         assert_eq!(stronger(d[0], c[0], 0.07), -found.largest);
-        assert!((found.error(1e-4, 0.07) - 1e-4 / 0.07).abs() < 1e-15);
+        assert!((found.error(1e-4, [0.0; 2], 0.07) - 1e-4 / 0.07).abs() < 1e-15);
+        // The second gives nothing there.
+        let of_constants = found.error(0.0, [0.02, 0.5], 0.07);
+        assert!((of_constants - 0.02 / 0.07).abs() < 1e-15);
     }
 
     #[test]

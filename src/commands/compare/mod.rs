@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::calibrate::requested_force::on_grid;
 use super::discretize::{PointsReport, point_rows, points_grid};
 use super::lambda::error_target::ErrorTarget;
-use super::lambda::{ForcePoints, LambdaOptions, object_points, proven_accuracy};
+use super::lambda::{ForcePoints, LambdaOptions, error_of_points, object_points, proven_accuracy};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -100,6 +100,8 @@ pub struct ComparedShape {
     pub points: usize,
     /// Its force constant, N/m; null where nothing can be rendered or no limit binds.
     pub lambda_n_per_m: Option<f64>,
+    /// Estimated relative error of that by the number of points and their heights; null where it was given.
+    pub lambda_error: Option<f64>,
     /// Its static currents, A.
     pub currents_a: Option<Vec<f64>>,
     /// Share of its points at which the limits bind with position feedback.
@@ -184,6 +186,8 @@ struct Allocators {
 /// Force constant and static currents of an object.
 struct Rendered {
     lambda_n_per_m: f64,
+    /// Relative; `None` of a constant that was given.
+    error: Option<f64>,
     currents_a: Vec<f64>,
 }
 
@@ -253,7 +257,7 @@ pub fn run(
                 &scene,
                 &solved,
                 (points, of_lambda_points, force),
-                &of_lambda.settings,
+                &of_lambda.for_document(&shape.document),
                 progress,
                 &mut warnings,
             )
@@ -266,7 +270,9 @@ pub fn run(
     let difference = StageAccuracy {
         estimate: error,
         relative_to: "1 just-noticeable difference".to_owned(),
-        method: "first order: the error of every coil's force at the places given".to_owned(),
+        method: "first order: the errors of every coil's force and of the force constants, at the points of both \
+                 surfaces alone"
+            .to_owned(),
     };
     let mut accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
     accuracy.extend(solved.linear_cores().map(|stage| (LINEAR_CORES, stage)));
@@ -329,10 +335,11 @@ impl Object {
         scene: &Scene,
         solved: &Solved,
         (points, of_lambda, force): (PointsReport, ForcePoints, RequestedForce),
-        settings: &Settings,
+        options: &LambdaOptions,
         progress: &dyn Progress,
         warnings: &mut Vec<String>,
     ) -> Result<Self, RunError> {
+        let settings = &options.settings;
         let found = &points.discretized.points;
         let heights = HeightGrid::of_points(&points_grid(found), &point_rows(found));
         let heights = heights.ok_or_else(|| {
@@ -357,7 +364,12 @@ impl Object {
         let solution = lambda::solve(&problem, settings)?;
         progress.end();
         let unusual = unusual(solution.status);
-        let rendered = Rendered::of(solution, settings);
+        let mut rendered = Rendered::of(solution, settings);
+        if let (Some(rendered), None) = (&mut rendered, settings.at_n_per_m) {
+            let (of, lambda) = ((scene, solved), rendered.lambda_n_per_m);
+            let error = error_of_points(of, (&of_lambda, problem), options, lambda, progress)?;
+            rendered.error = Some(error);
+        }
         let none = rendered.is_none() && unusual.is_none();
         let none = none.then_some(
             "no force constant by the criterion jnd (`lambda` states why); give one with --lambda",
@@ -395,6 +407,7 @@ impl Object {
             shape: self.name().to_owned(),
             points,
             lambda_n_per_m: rendered.map(|r| r.lambda_n_per_m),
+            lambda_error: rendered.and_then(|r| r.error),
             currents_a: rendered.map(|r| r.currents_a.clone()),
             saturated_share: rendered.map(|_| own.saturated as f64 / points as f64),
         }
@@ -484,6 +497,7 @@ impl Rendered {
         let point = point.filter(|point| able && point.lambda_n_per_m > 0.0);
         point.map(|point| Self {
             lambda_n_per_m: point.lambda_n_per_m,
+            error: None,
             currents_a: point.currents_a,
         })
     }
@@ -546,6 +560,10 @@ fn pairs(
     for (i, a) in objects.iter().enumerate() {
         for (j, b) in objects.iter().enumerate().skip(i + 1) {
             let able = a.rendered.is_some() && b.rendered.is_some();
+            let constants = [a, b].map(|object| {
+                let rendered = object.rendered.as_ref();
+                rendered.and_then(|r| r.error).unwrap_or(0.0)
+            });
             let both = |pick: fn(&RenderedForces) -> &[Felt], whole: bool| {
                 let of = |surface: usize, object: usize| -> Vec<Felt> {
                     let felt = pick(&fields[surface][object]).iter().copied();
@@ -581,7 +599,7 @@ fn pairs(
                 .into_iter()
                 .flatten()
             {
-                error = error.max(found.error(part, jnd));
+                error = error.max(found.error(part, constants, jnd));
             }
             let of =
                 |found: &Option<Difference>, pick: fn(&Difference) -> f64| found.as_ref().map(pick);

@@ -4,6 +4,7 @@ use super::{CompareReport, ComparedShape, Place};
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, table};
 use crate::cli::quantity::{count, force, number_to, percent};
+use crate::digits::with_error;
 
 /// The result for people.
 pub(super) fn summary(report: &CompareReport) -> String {
@@ -36,9 +37,18 @@ fn object(shape: &ComparedShape) -> String {
     format!(
         "{}: lambda {}, {}{saturated}",
         shape.shape,
-        describe::force_constant(shape.lambda_n_per_m),
+        lambda_with_error(shape),
         count(shape.points, "point")
     )
+}
+
+fn lambda_with_error(shape: &ComparedShape) -> String {
+    match (shape.lambda_n_per_m, shape.lambda_error) {
+        (Some(lambda), Some(relative)) if relative > 0.0 => {
+            format!("{} N/m", with_error(lambda, relative * lambda))
+        }
+        (lambda, _) => describe::force_constant(lambda),
+    }
 }
 
 /// One line a pair.

@@ -28,6 +28,7 @@ use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 use self::placement::Placed;
 pub(crate) use self::points::{ForcePoints, ForcesAt};
+pub(crate) use self::points_effect::error_of_points;
 use super::discretize::scattered::{self, ScatteredReport, ScatteredSummary};
 use super::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::RunError;
@@ -588,14 +589,8 @@ impl PosedProblem<'_> {
         let linear = self.solved.linear_cores();
         file.accuracy
             .extend(linear.map(|stage| (LINEAR_CORES.to_owned(), stage)));
-        let effects = [
-            ("lambda_of_points", self.effect_of_number(&file, progress)?),
-            ("lambda_of_heights", self.effect_of_heights(progress)?),
-        ];
-        for (name, moved) in effects {
-            file.accuracy
-                .extend(moved.map(|stage| (name.to_owned(), stage)));
-        }
+        let effects = self.effects_of_points(file.lambda_n_per_m, progress)?;
+        file.accuracy.extend(effects);
         let headline = self.headline(&file, progress)?;
         let amplification = headline.as_ref().map(|(_, amplification)| *amplification);
         file.headline = headline.map(|(headline, _)| headline);

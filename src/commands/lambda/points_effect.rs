@@ -6,14 +6,17 @@
 //! lifted and the problem is solved again with the forces there: a first-order estimate, because the
 //! errors of single points need not agree.
 
-use super::PosedProblem;
 use super::points::ForcesAt;
+use super::{ForcePoints, LambdaOptions, PosedProblem};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::lambda_file::LambdaFile;
+use crate::force_direction::RequestedForce;
 use crate::lambda::{self, ForceProblem};
 use crate::numerics::spread::spread;
 use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
+use crate::scene::steel::Solved;
 
 /// Points are lifted by this share of the lowest height: small enough for first order, and large
 /// beside what forces are rounded to.
@@ -23,17 +26,32 @@ const LIFTED_BY: f64 = 1e-3;
 const ENOUGH_POINTS: usize = 600;
 
 impl PosedProblem<'_> {
-    /// How far lambda is from the limit of ever more points; `None` without a lambda, for graded
-    /// points, whose patches are compared with wider ones instead, and for too few points.
+    /// What the points may add to the error of the chosen `lambda_n_per_m`, by the names of the stages.
     ///
     /// # Errors
     /// A problem that cannot be solved; interruption.
-    pub(super) fn effect_of_number(
+    pub(super) fn effects_of_points(
         &self,
-        file: &LambdaFile,
+        lambda_n_per_m: Option<f64>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<(String, StageAccuracy)>, RunError> {
+        let number = self.effect_of_number(lambda_n_per_m, progress)?;
+        let heights = self.effect_of_heights(progress)?;
+        let effects = [("lambda_of_points", number), ("lambda_of_heights", heights)];
+        let known = effects.into_iter();
+        Ok(known
+            .filter_map(|(name, stage)| Some((name.to_owned(), stage?)))
+            .collect())
+    }
+
+    /// How far lambda is from the limit of ever more points; `None` without a lambda, for graded
+    /// points, whose patches are compared with wider ones instead, and for too few points.
+    fn effect_of_number(
+        &self,
+        lambda_n_per_m: Option<f64>,
         progress: &dyn Progress,
     ) -> Result<Option<StageAccuracy>, RunError> {
-        let Some(lambda) = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) else {
+        let Some(lambda) = lambda_n_per_m.filter(|lambda| *lambda > 0.0) else {
             return Ok(None);
         };
         let with = (&self.options.wiring, &self.options.settings);
@@ -66,10 +84,7 @@ impl PosedProblem<'_> {
     }
 
     /// How far lambda moves with the error of the heights at the points; `None` without a lambda.
-    ///
-    /// # Errors
-    /// A problem that cannot be solved; interruption.
-    pub(super) fn effect_of_heights(
+    fn effect_of_heights(
         &self,
         progress: &dyn Progress,
     ) -> Result<Option<StageAccuracy>, RunError> {
@@ -129,6 +144,32 @@ impl PosedProblem<'_> {
             ),
         }))
     }
+}
+
+/// What the number of the points and the errors of their heights may add to the error of
+/// `lambda_n_per_m`, which solves `problem` at all of them, every coil by itself; relative.
+///
+/// # Errors
+/// A problem that cannot be solved; interruption.
+pub(crate) fn error_of_points(
+    (scene, solved): (&Scene, &Solved),
+    (points, problem): (&ForcePoints, ForceProblem),
+    options: &LambdaOptions,
+    lambda_n_per_m: f64,
+    progress: &dyn Progress,
+) -> Result<f64, RunError> {
+    let posed = PosedProblem {
+        scene,
+        solved,
+        field: ShapeField::default(),
+        points,
+        options,
+        unwired: problem,
+        problem,
+        force: RequestedForce::default(),
+    };
+    let effects = posed.effects_of_points(Some(lambda_n_per_m), progress)?;
+    Ok(effects.iter().map(|(_, stage)| stage.estimate).sum())
 }
 
 /// The `chosen` rows of `width` values each.
