@@ -179,7 +179,6 @@ fn array(
     if scene.coils.len() < 2 && scene.iron.is_none() {
         return Ok(None);
     }
-    let axes = &scene.design.array.positions_m;
     let lowest_m = scene.design.target_height_m;
     let solved = steel::solve(scene, scene.tolerances.field, lowest_m)?;
     let tolerance = scene.tolerances.inductances;
@@ -226,21 +225,8 @@ fn array(
         }
         None => None,
     };
-    let coils = axes
-        .iter()
-        .enumerate()
-        .map(|(coil, [x_m, y_m])| ArrayCoil {
-            coil,
-            x_m: *x_m,
-            y_m: *y_m,
-            inductance_h: matrix[coil][coil],
-            peak_field_t: peak_t.get(coil).copied(),
-            mean_field_t: mean_t.get(coil).copied(),
-            current_max_a: scene.upper_a[coil],
-        })
-        .collect();
     Ok(Some(ArraySummary {
-        coils,
+        coils: coils(scene, &matrix, [&peak_t, &mean_t]),
         mutual_inductance_h: matrix,
         slowest_inductance_h: slowest.inductance_h,
         settling_s: slowest.settling_s(),
@@ -251,6 +237,24 @@ fn array(
         iron,
         accuracy_missed,
     }))
+}
+
+/// Every coil with its inductance among the others; peak and mean of |B| in the cores, where they are known.
+fn coils(scene: &Scene, matrix_h: &[Vec<f64>], fields_t: [&[f64]; 2]) -> Vec<ArrayCoil> {
+    let axes = scene.design.array.positions_m.iter().enumerate();
+    axes.map(|(coil, [x_m, y_m])| {
+        let [peak_field_t, mean_field_t] = fields_t.map(|field| field.get(coil).copied());
+        ArrayCoil {
+            coil,
+            x_m: *x_m,
+            y_m: *y_m,
+            inductance_h: matrix_h[coil][coil],
+            peak_field_t,
+            mean_field_t,
+            current_max_a: scene.upper_a[coil],
+        }
+    })
+    .collect()
 }
 
 /// The windings' inductance matrix without steel, H, and the relative error of its entries, to

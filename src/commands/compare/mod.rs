@@ -267,14 +267,7 @@ pub fn run(
     let fields = fields(&scene, &objects, progress)?;
     let stage = proven_accuracy(&scene, &solved);
     let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
-    let difference = StageAccuracy {
-        estimate: error,
-        relative_to: "1 just-noticeable difference".to_owned(),
-        method: "first order: the errors of every coil's force and of the force constants, at the points of both \
-                 surfaces alone"
-            .to_owned(),
-    };
-    let mut accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
+    let mut accuracy = BTreeMap::from([("forces", stage), ("difference", of_difference(error))]);
     accuracy.extend(solved.linear_cores().map(|stage| (LINEAR_CORES, stage)));
     Ok(CompareReport {
         schema_version: SCHEMA_VERSION,
@@ -299,6 +292,17 @@ pub fn run(
         accuracy,
         warnings,
     })
+}
+
+/// The largest error of the differences.
+fn of_difference(estimate: f64) -> StageAccuracy {
+    StageAccuracy {
+        estimate,
+        relative_to: "1 just-noticeable difference".to_owned(),
+        method: "first order: the errors of every coil's force and of the force constants, at the points of both \
+                 surfaces alone"
+            .to_owned(),
+    }
 }
 
 /// Remarks on the steel.
