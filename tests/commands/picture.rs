@@ -106,7 +106,7 @@ fn a_field_s_drawing_shows_what_a_probe_finds() {
         .expect("a core");
     let alone = TWO.replace("pitch_mm = 43.0", "pitch_mm = 43.0, coupling = \"none\"");
     let plate =
-        "[plate]\nthickness_mm = 3.0\nx_mm = 120.0\ny_mm = 60.0\nrelative_permeability = 700.0\n";
+        "[plate]\nthickness_mm = 6.0\nx_mm = 70.0\ny_mm = 40.0\nrelative_permeability = 700.0\n";
     for text in [
         TWO.replace(core, ""),
         TWO.to_owned(),

@@ -176,7 +176,7 @@ fn bilinear(heights: &[Option<f64>], plan: &Grid, p: [f64; 2]) -> Option<f64> {
 fn random_soups_match_a_ray_caster() {
     let mut random = Random::new(11);
     let mut tried = 0;
-    for case in 0..60 {
+    for case in 0..40 {
         let count = 3 + random.below(25);
         let mut triangles: Vec<Triangle> = (0..count)
             .map(|_| {
@@ -228,7 +228,7 @@ fn random_soups_match_a_ray_caster() {
         assert!(apart.lower_m <= apart.upper_m, "{apart:?}");
         assert!(apart.lower_m <= found.bound_m(), "{apart:?} {found:?}");
     }
-    assert_eq!(tried, 120);
+    assert_eq!(tried, 80);
 }
 
 fn shape(name: &str) -> Mesh {
@@ -395,7 +395,7 @@ fn sheets_over_each_other_take_no_longer_than_the_highest() {
         [corners, [corners[1], far, corners[2]]]
     };
     let ridge = roof(&[[-1.0, 0.9], [0.31, 1.7], [2.0, 0.9]], [-1.0, 2.0]);
-    let plan = grid((0.0, 1.0, 16), (0.0, 1.0, 14));
+    let plan = grid((0.0, 1.0, 9), (0.0, 1.0, 8));
     let (expected, _) = certified(&exact(ridge.clone()), &plan);
     assert!(expected.above.value_m > 1e-3, "{expected:?}");
     let below = |k: usize| 0.01 * k as f64 - 2.0;
@@ -421,7 +421,7 @@ fn sheets_over_each_other_take_no_longer_than_the_highest() {
         assert!(apart.unwrap().lower_m <= found.bound_m(), "{case}");
         // By themselves they are seen.
         let (found, _) = certified(&exact(stack), &plan);
-        assert_eq!(found.cells.inner, 15 * 13, "{case}");
+        assert_eq!(found.cells.inner, 8 * 7, "{case}");
         let plane = case != 2;
         assert_eq!(found.bound_m() < 1e-9, plane, "{case}: {found:?}");
     }

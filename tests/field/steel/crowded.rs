@@ -208,13 +208,12 @@ fn study(scenes: impl Iterator<Item = Crowd>, tolerance: f64) {
     assert_eq!(covered("close cores", &errors), 0);
 }
 
-/// Scenes of the study below of which the difference of two resolutions that left out the same of what
+/// A scene of the study below of which the difference of two resolutions that left out the same of what
 /// passes between the cores, and one mode more or less, did not cover the error.
 #[test]
 fn close_cores_have_the_error_that_is_stated() {
     let mut random = Random::new(SEED);
-    let scenes: Vec<Crowd> = (0..58).map(|_| crowd(&mut random)).collect();
-    study([28, 57].map(|k| scenes[k].clone()).into_iter(), 1e-2);
+    study((0..29).map(|_| crowd(&mut random)).skip(28), 1e-2);
 }
 
 /// `cargo test --release --test field steel -- --ignored --nocapture close_cores_in_full` prints the table;
