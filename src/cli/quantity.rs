@@ -1,5 +1,7 @@
 //! Numbers for people: nice units, few digits.
 
+use std::fmt::Display;
+
 use crate::digits::with_error;
 use crate::report::number::{plain, prefix_of};
 
@@ -151,13 +153,12 @@ pub fn bytes(bytes: u64) -> String {
     si_to(bytes as f64, "B", 3)
 }
 
-/// `n` things: `1 coil`, `9 coils`.
+/// `n` things: `1 coil`, `9 coils`, `1.5 layers`.
 #[must_use]
-pub fn count(n: usize, thing: &str) -> String {
-    if n == 1 {
-        format!("1 {thing}")
-    } else {
-        format!("{n} {thing}s")
+pub fn count(n: impl Display, thing: &str) -> String {
+    match n.to_string().as_str() {
+        "1" => format!("1 {thing}"),
+        many => format!("{many} {thing}s"),
     }
 }
 

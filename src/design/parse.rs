@@ -6,6 +6,7 @@ use super::checks;
 use super::diagnostics::{Faults, InvalidDocument};
 use super::draft::{Draft, Need};
 use super::iron::{Iron, IronShape};
+use super::keys;
 use super::model::{
     Array, BANDWIDTH_HZ, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace,
 };
@@ -27,7 +28,7 @@ impl Design {
         path: &Path,
         need: Need,
     ) -> Result<(Self, Faults), InvalidDocument> {
-        read_document(text, path, |root, sink| {
+        read_document(text, path, keys::of_designs, |root, sink| {
             let draft = Draft::read(root, need);
             checks::check(&draft, need, sink);
             draft.design(path, need, sink)
@@ -40,7 +41,7 @@ impl Design {
     /// # Errors
     /// Every fault found.
     pub fn check_keys(text: &str, path: &Path) -> Result<(), InvalidDocument> {
-        read_document(text, path, |root, _| {
+        read_document(text, path, keys::of_designs, |root, _| {
             Draft::read(root, Need::SWEEP);
             Some(())
         })

@@ -33,6 +33,8 @@ pub struct Sink {
     faults: RefCell<Vec<Fault>>,
     assumed: RefCell<Vec<Assumed>>,
     keys: Option<Keys>,
+    /// Every key of such documents, for advice.
+    all_keys: Option<fn() -> Vec<Key>>,
 }
 
 impl Sink {
@@ -60,7 +62,7 @@ impl Sink {
 /// Of larger texts only the first syntax error is reported.
 const EVERY_ERROR_BYTES: usize = 64 << 10;
 
-/// Reads the document `text` with `read`, which takes the root section and the sink.
+/// Reads the document `text`, one of those with `all_keys`, with `read`, which takes the root section and the sink.
 ///
 /// Returns the value and the warnings.
 ///
@@ -70,12 +72,16 @@ const EVERY_ERROR_BYTES: usize = 64 << 10;
 pub fn read_document<T>(
     text: &str,
     path: &Path,
+    all_keys: fn() -> Vec<Key>,
     read: impl FnOnce(&mut Section<'_>, &Sink) -> Option<T>,
 ) -> Result<(T, Faults), InvalidDocument> {
     // A byte order mark would count as a column.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = parsed(text);
-    let sink = Sink::default();
+    let sink = Sink {
+        all_keys: Some(all_keys),
+        ..Sink::default()
+    };
     errors
         .iter()
         .for_each(|error| sink.add(syntax_fault(error, text)));
@@ -90,6 +96,14 @@ pub fn read_document<T>(
     match value {
         Some(value) if !refused => Ok((value, faults)),
         _ => Err(InvalidDocument { faults }),
+    }
+}
+
+/// How a section is named to the user.
+fn section_name(path: &str) -> String {
+    match path {
+        "" => "the top level".to_owned(),
+        path => format!("[{path}]"),
     }
 }
 
@@ -336,11 +350,7 @@ impl<'a> Section<'a> {
     }
 
     fn unknown(&self, name: &str) -> Fault {
-        let place = if self.path.is_empty() {
-            "the top level".to_owned()
-        } else {
-            format!("[{}]", self.path)
-        };
+        let place = section_name(&self.path);
         Fault::error(
             self.path_of(&escaped(name, QUOTED_MAX)),
             format!("unknown key {} in {place}", quoted(name)),
@@ -349,10 +359,22 @@ impl<'a> Section<'a> {
 
     /// What an unknown key may have been meant to be.
     fn advice(&self, name: &str) -> String {
-        match nearest(name, &self.known) {
-            Some(near) => format!("did you mean {near}?"),
-            None => format!("known here: {}", self.known.join(", ")),
+        if let Some(near) = nearest(name, &self.known) {
+            return format!("did you mean {near}?");
         }
+        let homes = self.sections_with(name);
+        let known = format!("known here: {}", self.known.join(", "));
+        match homes.is_empty() {
+            true => known,
+            false => format!("it is a key of {}; {known}", homes.join(", ")),
+        }
+    }
+
+    /// The sections that have a key of this `name`.
+    fn sections_with(&self, name: &str) -> Vec<String> {
+        let all = self.sink.all_keys.map_or_else(Vec::new, |keys| keys());
+        let homes = all.into_iter().filter(|key| key.name == name);
+        homes.map(|key| section_name(&key.section)).collect()
     }
 
     pub(super) fn found(&mut self, key: &'static str) -> Option<ValueRef<'a>> {

@@ -41,6 +41,11 @@ fn an_unknown_key_names_the_nearest() {
             format!("{SOUND}[suply]\n"),
             "d.toml:8:2: error: suply: unknown key \"suply\" in the top level (did you mean supply?)",
         ),
+        // Right in another section.
+        (
+            format!("{SOUND}[target]\npitch_mm = 30.0\n"),
+            "d.toml:9:1: error: target.pitch_mm: unknown key \"pitch_mm\" in [target] (it is a key of [array], [search.array]; known here: height_mm)",
+        ),
         (
             format!("{SOUND}[target]\nheight_m = 0.03\n"),
             "d.toml:9:1: error: target.height_m: unknown key \"height_m\" in [target] (did you mean height_mm?)",

@@ -12,7 +12,7 @@ struct Given {
     name: LimitName,
     /// What it is, as [`Contradiction`] says it.
     what: &'static str,
-    wires: &'static str,
+    wire: &'static str,
     size_m: f64,
     /// The wires lie side by side in this much of it, ...
     filled_m: f64,
@@ -43,7 +43,7 @@ fn given(task: &Task) -> Vec<Given> {
     let length = fixed.length_m.map(|length_m| Given {
         name: LimitName::FixedLength,
         what: "length",
-        wires: "turns",
+        wire: "turn",
         size_m: length_m,
         filled_m: length_m,
         times: 1.0,
@@ -52,7 +52,7 @@ fn given(task: &Task) -> Vec<Given> {
     let depth = diameters.map(|(inner_m, outer_m)| Given {
         name: LimitName::FixedOuter,
         what: "outer diameter",
-        wires: "layers",
+        wire: "layer",
         size_m: outer_m,
         filled_m: outer_m - inner_m,
         times: 2.0,
@@ -87,7 +87,8 @@ impl Given {
                     .is_none_or(|(other_m, _)| off_m.abs() < *other_m)
                 {
                     let (size, wire) = (mm(self.size_m + off_m), mm(strand.diameter_m));
-                    let text = format!("{size} ({count} {} of {wire})", self.wires);
+                    let wires = if count == 1.0 { "" } else { "s" };
+                    let text = format!("{size} ({count} {}{wires} of {wire})", self.wire);
                     *side = Some((off_m.abs(), text));
                 }
             }
@@ -102,10 +103,10 @@ impl Given {
             between: [self.name, LimitName::OneTurn],
             by: by.map(|(off_m, _)| *off_m).fold(f64::INFINITY, f64::min),
             message: format!(
-                "the given {} of {} is not filled by whole {}; give one that is, the nearest: {}",
+                "the given {} of {} is not filled by whole {}s; give one that is, the nearest: {}",
                 self.what,
                 mm(self.size_m),
-                self.wires,
+                self.wire,
                 nearest.join(" or ")
             ),
         }
@@ -147,7 +148,7 @@ mod tests {
         assert!(
             refused
                 .message
-                .ends_with("the nearest: 25.4 mm (1 layers of 0.7 mm)"),
+                .ends_with("the nearest: 25.4 mm (1 layer of 0.7 mm)"),
             "{refused:?}"
         );
     }

@@ -153,10 +153,9 @@ fn dimensions(coil: &BestCoilSummary) -> String {
             let (size, wire_m) = (&coil.size, coil.wire_diameter_m);
             let depth_m = 0.5 * (size.outer_diameter_m - size.inner_diameter_m);
             format!(
-                "{} {} in {} layers (--wound for whole ones)",
-                number(coil.turns),
-                if coil.turns == 1.0 { "turn" } else { "turns" },
-                number_to(depth_m / wire_m, 3)
+                "{} in {} (--wound for whole ones)",
+                count(number(coil.turns), "turn"),
+                count(number_to(depth_m / wire_m, 3), "layer")
             )
         }
     };

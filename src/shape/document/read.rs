@@ -60,7 +60,7 @@ impl ShapeDocument {
     /// # Errors
     /// Every fault found. Whether the surface exists is for the reader of surfaces to say.
     pub fn from_toml(text: &str, path: &Path) -> Result<(Self, Faults), InvalidDocument> {
-        read_document(text, path, |root, _| document(root, path))
+        read_document(text, path, keys, |root, _| document(root, path))
     }
 
     /// The shape in the file `path`, as [`ShapeDocument::from_toml`].
