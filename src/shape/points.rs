@@ -508,22 +508,24 @@ fn axis(name: &str, request: AxisRequest, extent: [f64; 2]) -> Result<Axis, Shap
             "runs from {from} to {to} m; both ends must be finite"
         ));
     }
-    if samples > 1 && samples <= MOST_POINTS {
-        let finest = 4.0 * f64::EPSILON * from.abs().max(to.abs());
-        if axis.step() <= finest {
-            let advice = match request {
-                AxisRequest::Given(_) => "the first end must be the smaller one",
-                AxisRequest::Extent(_) => {
-                    "the surface has no extent along it; give the axis, or one sample"
-                }
-            };
-            let (from_mm, to_mm) = (from * 1000.0, to * 1000.0);
-            return fault(format!(
-                "runs from {from_mm} to {to_mm} mm in {samples} samples; {advice}"
-            ));
+    let finest = 4.0 * f64::EPSILON * from.abs().max(to.abs());
+    let advice = match (samples, request) {
+        (1, _) if to - from > finest => {
+            "one cannot include both ends; take 2 samples or more, or give the axis two equal ends"
         }
-    }
-    Ok(axis)
+        (1, _) => return Ok(axis),
+        // More are refused for their number.
+        _ if samples > MOST_POINTS || axis.step() > finest => return Ok(axis),
+        (_, AxisRequest::Given(_)) => "the first end must be the smaller one",
+        (_, AxisRequest::Extent(_)) => {
+            "the surface has no extent along it; give the axis, or one sample"
+        }
+    };
+    fault(format!(
+        "runs from {} to {} mm (samples: {samples}); {advice}",
+        from * 1000.0,
+        to * 1000.0
+    ))
 }
 
 /// Picks the grid points that lie on the surface.

@@ -319,6 +319,9 @@ fn grids_that_do_not_ascend_are_refused() {
         (given(0.02, f64::NAN, 2), "finite"),
         (given(-0.05, 0.05, 0), "no sample"),
         (given(-0.05, 0.05, 1 << 40), "at most"),
+        (given(-0.05, 0.05, 1), "both ends"),
+        // It was put at the border, as if the surface were a line there.
+        (AxisRequest::Extent(1), "both ends"),
     ] {
         let said = message(&file(&path, 0.001, lifted(0.03), GridRequest { x, y }));
         assert!(said.contains(part), "{said}");
