@@ -1,12 +1,11 @@
 //! Exact heights of a mesh over a grid: the highest intersection of each vertical line.
 //!
-//! Borders are inclusive. Where nothing covers a point exactly, and at vertical walls, what lies
-//! within the coordinates' own rounding counts as well: a circle's rim is met at its nodes
-//! although the file rounds them. The result does not depend on the order or the orientation of
-//! the triangles, nor on the number of threads: every choice is a maximum.
+//! Borders are inclusive. What lies within the coordinates' own rounding counts as well: a circle's
+//! rim is met at its nodes although the file rounds them, whatever lies below it. The result does not
+//! depend on the order or the orientation of the triangles, nor on the number of threads: every choice
+//! is a maximum.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
@@ -199,66 +198,17 @@ impl Hit {
     }
 }
 
-/// Facets that touch a point without covering it.
-#[derive(Clone, Copy)]
-struct Touch {
-    hit: Hit,
-    wall: bool,
-}
-
-impl Touch {
-    fn with(self, triangles: &[Triangle], other: Self) -> Self {
-        Self {
-            hit: higher(triangles, self.hit, other.hit),
-            wall: self.wall | other.wall,
-        }
-    }
-
-    /// The hit that counts at a point: the covering one, unless nothing covers it or a wall is there.
-    fn or_covered(self, triangles: &[Triangle], covering: Hit) -> Hit {
-        if self.wall || covering.height == f64::NEG_INFINITY {
-            higher(triangles, covering, self.hit)
-        } else {
-            covering
-        }
-    }
-}
-
-/// How a contact meets a point.
-enum Meeting {
-    None,
-    Covers(Hit),
-    Touches(Touch),
-}
-
-fn meeting(triangle: u32, contact: Contact) -> Meeting {
-    let touches = |height, wall| {
-        Meeting::Touches(Touch {
-            hit: Hit { height, triangle },
-            wall,
-        })
-    };
-    match contact {
-        Contact::None => Meeting::None,
-        Contact::Covers(height) => Meeting::Covers(Hit { height, triangle }),
-        Contact::Near(height) => touches(height, false),
-        Contact::Wall(height) => touches(height, true),
-    }
-}
-
 /// The best hits of some of the triangles.
 struct Layer<'a> {
     triangles: &'a [Triangle],
-    covering: Vec<Hit>,
-    touching: BTreeMap<usize, Touch>,
+    hits: Vec<Hit>,
 }
 
 impl<'a> Layer<'a> {
     fn new(triangles: &'a [Triangle], points: usize) -> Self {
         Self {
             triangles,
-            covering: vec![NOTHING; points],
-            touching: BTreeMap::new(),
+            hits: vec![NOTHING; points],
         }
     }
 
@@ -286,60 +236,38 @@ impl<'a> Layer<'a> {
             };
             for column in columns {
                 let point = row * nodes.x.nodes.len() + column;
-                if !seen.is_hidden_below(self.covering[point].height) {
-                    self.meet(point, triangle, seen.contact([nodes.x.nodes[column], y]));
+                let best = self.hits[point];
+                if seen.is_hidden_below(best.height) {
+                    continue;
+                }
+                if let Some(height) = seen.contact([nodes.x.nodes[column], y]).height() {
+                    self.hits[point] = higher(self.triangles, best, Hit { height, triangle });
                 }
             }
         }
     }
 
-    fn meet(&mut self, point: usize, triangle: u32, contact: Contact) {
-        match meeting(triangle, contact) {
-            Meeting::None => {}
-            Meeting::Covers(hit) => {
-                self.covering[point] = higher(self.triangles, self.covering[point], hit);
-            }
-            Meeting::Touches(touch) => self.touch(point, touch),
-        }
-    }
-
-    fn touch(&mut self, point: usize, new: Touch) {
-        let triangles = self.triangles;
-        self.touching
-            .entry(point)
-            .and_modify(|old| *old = old.with(triangles, new))
-            .or_insert(new);
-    }
-
     fn merge(mut self, other: Self) -> Self {
         let triangles = self.triangles;
-        self.covering
+        self.hits
             .par_iter_mut()
-            .zip(&other.covering)
-            .with_min_len(fluxform_base::progress::items_a_task(other.covering.len()))
+            .zip(&other.hits)
+            .with_min_len(fluxform_base::progress::items_a_task(other.hits.len()))
             .for_each(|(mine, theirs)| {
                 fluxform_base::progress::poll();
                 *mine = higher(triangles, *mine, *theirs);
             });
-        for (point, touch) in other.touching {
-            self.touch(point, touch);
-        }
         self
     }
 
     /// Decides every point.
-    fn samples(mut self) -> Vec<Option<Sample>> {
-        let triangles = self.triangles;
-        for (point, touch) in &self.touching {
-            let covering = &mut self.covering[*point];
-            *covering = touch.or_covered(triangles, *covering);
-        }
-        self.covering
+    fn samples(self) -> Vec<Option<Sample>> {
+        self.hits
             .par_iter()
-            .with_min_len(fluxform_base::progress::items_a_task(self.covering.len()))
+            .with_min_len(fluxform_base::progress::items_a_task(self.hits.len()))
             .map(|hit| {
                 fluxform_base::progress::poll();
-                hit.sample(triangles)
+                hit.sample(self.triangles)
             })
             .collect()
     }
@@ -347,18 +275,12 @@ impl<'a> Layer<'a> {
 
 /// The surface over one point, from how the triangles touch its vertical line.
 pub(super) fn sample_of(triangles: &[Triangle], contacts: &[(u32, Contact)]) -> Option<Sample> {
-    let (mut covering, mut touching) = (NOTHING, None::<Touch>);
-    for (triangle, contact) in contacts {
-        match meeting(*triangle, *contact) {
-            Meeting::None => {}
-            Meeting::Covers(hit) => covering = higher(triangles, covering, hit),
-            Meeting::Touches(new) => {
-                touching = Some(touching.map_or(new, |old| old.with(triangles, new)));
-            }
-        }
-    }
-    let hit = touching.map_or(covering, |touch| touch.or_covered(triangles, covering));
-    hit.sample(triangles)
+    let hits = contacts.iter().filter_map(|&(triangle, contact)| {
+        let height = contact.height()?;
+        Some(Hit { height, triangle })
+    });
+    hits.fold(NOTHING, |a, b| higher(triangles, a, b))
+        .sample(triangles)
 }
 
 /// The higher hit. At equal heights the face seen from above is requested: any face before a wall,

@@ -11,7 +11,7 @@ use crate::file_mesh::{Bounds, Triangle};
 use crate::height::{Grid, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
-use crate::point_flags::{self, Rules, contacts, is_closed, is_oriented};
+use crate::point_flags::{Rules, contacts, is_closed, is_oriented};
 use crate::surface::Surface;
 use crate::vertical_hit::{Contact, is_wall, may_touch};
 use fluxform_numerics::axis::Axis;
@@ -91,17 +91,18 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let normal = normal(facet);
         let level = LEVEL * dot(normal, normal).sqrt();
         let p = [point[0], point[1]];
-        let covered = is_covered(triangles, index.at(p), (facet, point), depth_m, rules);
+        let above = sheets_above(triangles, index.at(p), (facet, point), depth_m, rules);
         // A wall, seen edge-on, hides nothing by itself; the file's rounding may make it lean.
         if normal[2].abs() <= level || is_wall(&triangles[facet], rules.reach_m) {
             return [1, 0, 0, 0];
         }
         let up = usize::from(if by_sheets {
-            sheets_above(triangles, index.at(p), (facet, point), depth_m, rules).is_multiple_of(2)
+            above.is_multiple_of(2)
         } else {
             outward * normal[2] > 0.0
         });
-        [1, usize::from(covered), up, up * usize::from(covered)]
+        let covered = usize::from(above > 0);
+        [1, covered, up, up * covered]
     };
     // Where triangles lie over each other many times, a line meets all of them: fewer lines.
     let met = |k: usize| {
@@ -158,38 +159,23 @@ fn sheets_above(
     depth_m: f64,
     rules: Rules,
 ) -> usize {
-    let above = |(at, contact)| match contact {
-        Contact::Covers(height) if at as usize != facet && height > point[2] + depth_m => {
-            Some(height)
-        }
+    let (p, seen_m) = ([point[0], point[1]], point[2] + depth_m);
+    let rises = |at: &u32| {
+        let at = *at as usize;
+        at != facet && may_cover(&triangles[at], p, seen_m, 2.0 * rules.reach_m)
+    };
+    let rising: Vec<u32> = touching.iter().copied().filter(rises).collect();
+    // What is merely near is a steep facet's neighbour, which ends beside the point.
+    let above = |(_, contact)| match contact {
+        Contact::Covers(height) if height > seen_m => Some(height),
         _ => None,
     };
-    let contacts = contacts(triangles, touching, [point[0], point[1]], rules);
+    let contacts = contacts(triangles, &rising, p, rules);
     let mut heights: Vec<f64> = contacts.filter_map(above).collect();
     heights.sort_unstable_by(f64::total_cmp);
     // Triangles that meet over the point are one sheet.
     heights.dedup_by(|a, b| *a - *b <= depth_m);
     heights.len()
-}
-
-/// Whether anything lies more than `depth_m` above a `point` on a `facet`.
-fn is_covered(
-    triangles: &[Triangle],
-    touching: &[u32],
-    (facet, point): (usize, [f64; 3]),
-    depth_m: f64,
-    rules: Rules,
-) -> bool {
-    let (p, seen_m) = ([point[0], point[1]], point[2] + depth_m);
-    // A facet that does not reach over the point does not cover it; the point's own facet is met in any case.
-    let rises = |at: &u32| {
-        let at = *at as usize;
-        at == facet || may_cover(&triangles[at], p, seen_m, 2.0 * rules.reach_m)
-    };
-    let above: Vec<u32> = touching.iter().copied().filter(rises).collect();
-    above.iter().any(|at| *at as usize != facet)
-        && point_flags::sample_at(triangles, &above, p, rules)
-            .is_some_and(|top| top.height_m > seen_m)
 }
 
 /// Whether any of `triangle` lies above `height_m` and within `reach_m` of the line through `p`.
@@ -264,6 +250,21 @@ mod tests {
         let found = Hidden::of(&mushroom).unwrap();
         let share = (25.0 - 4.0) / (25.0 - 4.0 + 36.0 - 0.01);
         assert!((found.of_upward - share).abs() < 0.01, "{found:?} {share}");
+    }
+
+    /// Within reach of its upper border a steep facet hid its neighbour.
+    #[test]
+    fn steep_facets_of_a_coarse_file_hide_nothing() {
+        let at = |x: f64, y: f64| [x, y, 50.0 + 20.0 * x];
+        let [a, b, c, d] = [at(0.0, 0.0), at(2.0, 0.0), at(2.0, 2.0), at(0.0, 2.0)];
+        let file = FileMesh {
+            triangles: vec![[a, b, c], [a, c, d]],
+            coordinate_rounding: 6e-3,
+            ..FileMesh::default()
+        };
+        let placed = Transform::new(1e-3, &Placement::default());
+        let surface = Surface::Mesh(Mesh::place(file, &placed).unwrap());
+        assert_eq!(Hidden::of(&surface).unwrap().of_area, 0.0);
     }
 
     /// Facets turned round made half of a box's upper side an undercut.

@@ -30,6 +30,17 @@ pub(super) enum Contact {
     Wall(f64),
 }
 
+impl Contact {
+    /// The surface's height there. What is within reach counts like what covers: on a silhouette rounding
+    /// alone decides between the two.
+    pub(super) fn height(self) -> Option<f64> {
+        match self {
+            Self::None => None,
+            Self::Covers(height) | Self::Near(height) | Self::Wall(height) => Some(height),
+        }
+    }
+}
+
 /// A triangle prepared for many points.
 pub(super) struct Seen {
     /// Canonically ordered.
@@ -58,10 +69,9 @@ impl Seen {
         }
     }
 
-    /// True where nothing of this triangle counts at a point that is covered at `height`. A wall
-    /// always counts: where one stands, what is merely near counts too.
+    /// True where all of this triangle is lower than `height`.
     pub(super) fn is_hidden_below(&self, height: f64) -> bool {
-        self.top < height && !self.wall
+        self.top < height
     }
 
     /// A range of x that holds every point of row `y` that this triangle touches.

@@ -390,6 +390,30 @@ fn a_far_origin_loses_no_border() {
     }
 }
 
+/// Rounding decided there which body a point of the silhouette belonged to: of 48 points 16 fell onto the slab.
+#[test]
+fn a_silhouette_over_another_body_is_met_at_all_its_nodes() {
+    let slab = box_of(|k| {
+        let end = |bit: usize| if k & bit == 0 { -20.0 } else { 20.0 };
+        [end(1), end(2), if k & 4 == 0 { 0.0 } else { 10.0 }]
+    });
+    // A double pyramid, whose silhouette is |x| + |y| = 12 mm at a height of 30 mm.
+    let waist = [[12.0, 0.0], [0.0, 12.0], [-12.0, 0.0], [0.0, -12.0f32]];
+    let corner = |k: usize| [waist[k % 4][0], waist[k % 4][1], 30.0];
+    let faces =
+        (0..4).flat_map(|k| [40.0, 22.0].map(|apex| [corner(k), corner(k + 1), [0.0, 0.0, apex]]));
+    let file = stl::read(&binary(&[slab, faces.collect()].concat())).unwrap();
+    let mesh = Mesh::place(file, &Transform::new(0.001, &Placement::default())).unwrap();
+    let found = sample(&mesh, &grid((-0.02, 0.02, 41), (-0.02, 0.02, 41)));
+    let steps = |k: usize| (k % 41).abs_diff(20) + (k / 41).abs_diff(20);
+    let waist: Vec<usize> = (0..found.len()).filter(|k| steps(*k) == 12).collect();
+    assert_eq!(waist.len(), 48);
+    for k in waist {
+        let height_m = found[k].unwrap().height_m;
+        assert!((height_m - 0.03).abs() < 1e-8, "{k}: {height_m}");
+    }
+}
+
 /// Of two faces that both fall from a ridge the flatter is seen, of two that rise from a gutter the
 /// steeper, and of one that rises and one that does not the rising one.
 #[test]
