@@ -76,7 +76,7 @@ impl Reader {
                     any = true;
                     self.begin(&e).map_err(|what| document.fault(what))?;
                 }
-                Step::End { name, text } => {
+                Step::End { name, text, .. } => {
                     self.end(&name, text.trim())
                         .map_err(|what| document.fault(what))?;
                 }

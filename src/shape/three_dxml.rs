@@ -45,7 +45,7 @@ fn root_part(archive: &mut Archive<'_>) -> Result<String, ReadError> {
     let mut document = Document::new(&manifest, &text);
     loop {
         match document.step()? {
-            Step::End { name, text } if name == "Root" => {
+            Step::End { name, text, .. } if name == "Root" => {
                 return archive.find(text.trim()).ok_or_else(missing);
             }
             Step::Done => return Err(missing()),
@@ -94,7 +94,7 @@ impl Structure {
                     "Instance3D" | "InstanceRep" => open = Instance::default(),
                     _ => {}
                 },
-                Step::End { name, text } => match name.as_str() {
+                Step::End { name, text, .. } => match name.as_str() {
                     "IsAggregatedBy" => open.within = reference(&text, part).map_err(as_fault)?,
                     "IsInstanceOf" => open.of = reference(&text, part).map_err(as_fault)?,
                     "RelativeMatrix" => open.place = Some(transform(&text).map_err(as_fault)?),
@@ -241,7 +241,7 @@ fn representation_mesh(
                 ("Face", Some(rep)) if coarser == 0 => face(&e, rep).map_err(as_fault)?,
                 _ => {}
             },
-            Step::End { name, text } => match (name.as_str(), open.last_mut()) {
+            Step::End { name, text, .. } => match (name.as_str(), open.last_mut()) {
                 ("PolygonalLOD", _) => coarser = coarser.saturating_sub(1),
                 ("Positions", Some(rep)) if coarser == 0 => {
                     rep.positions = Some(positions(&text, numbers).map_err(as_fault)?);

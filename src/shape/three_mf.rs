@@ -1,7 +1,8 @@
 //! 3MF: meshes and components of an archive's model parts, placed by the build.
 //!
 //! Read: the core specification, and of the production extension components and items in other
-//! parts. Materials, slices and properties change no surface and are passed over; an extension
+//! parts. Materials, slices and properties change no surface and are passed over, and so are elements of
+//! other namespaces; an extension
 //! that the file requires and that is not known is refused, since it may change the surface.
 
 use std::collections::{HashMap, HashSet};
@@ -127,6 +128,15 @@ impl Model {
             let as_fault = |what: String| document.fault(what);
             match step {
                 Step::Start(e) => match (e.name(), &mut open) {
+                    ("beamlattice" | "volumetricstack" | "booleans", Some(_)) => {
+                        let what = format!(
+                            "an object is a `{}`, which is not read; export it as a mesh",
+                            e.name()
+                        );
+                        return Err(as_fault(what));
+                    }
+                    // A vendor's own `vertex` would shift the numbers of all that follow.
+                    _ if e.is_foreign() => {}
                     ("model", _) => self.begin(&e, is_root).map_err(as_fault)?,
                     ("object", None) => open = Some(object(&e).map_err(as_fault)?),
                     ("vertex", Some(object)) => {
@@ -141,16 +151,13 @@ impl Model {
                     ("item", None) if is_root => {
                         self.items.push(placed(&e, name).map_err(as_fault)?);
                     }
-                    ("beamlattice" | "volumetricstack" | "booleans", Some(_)) => {
-                        let what = format!(
-                            "an object is a `{}`, which is not read; export it as a mesh",
-                            e.name()
-                        );
-                        return Err(as_fault(what));
-                    }
                     _ => {}
                 },
-                Step::End { name: ended, .. } if ended == "object" => {
+                Step::End {
+                    name: ended,
+                    foreign: false,
+                    ..
+                } if ended == "object" => {
                     if let Some(object) = open.take() {
                         self.add(name, object).map_err(as_fault)?;
                     }

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use quick_xml::XmlVersion;
 use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesRef, BytesStart, Event};
+use quick_xml::name::{NamespaceError, ResolveResult};
 
 use crate::read_error::{Place, ReadError};
 
@@ -21,6 +22,8 @@ pub(super) enum Step<'a> {
         name: String,
         /// Its own text, trimmed.
         text: String,
+        /// As [`Element::is_foreign`].
+        foreign: bool,
     },
     /// The document ends.
     Done,
@@ -29,12 +32,18 @@ pub(super) enum Step<'a> {
 /// An element's start.
 pub(super) struct Element<'a> {
     start: BytesStart<'a>,
+    foreign: bool,
 }
 
 impl<'a> Element<'a> {
     /// Its name without a prefix.
     pub(super) fn name(&self) -> &str {
         local(self.start.name().into_inner())
+    }
+
+    /// Whether it, or an element around it, is of another namespace than the document's first element.
+    pub(super) fn is_foreign(&self) -> bool {
+        self.foreign
     }
 
     /// The value of the attribute with this local name.
@@ -63,13 +72,21 @@ fn local(name: &str) -> &str {
     name.rsplit_once(':').map_or(name, |(_, local)| local)
 }
 
+/// An element that has not ended.
+struct Open {
+    name: String,
+    text: String,
+    foreign: bool,
+}
+
 /// A document, read once from beginning to end.
 pub(super) struct Document<'a> {
     part: &'a str,
     text: &'a str,
-    reader: quick_xml::Reader<&'a [u8]>,
-    /// Own text of every open element, with its name.
-    open: Vec<(String, String)>,
+    reader: quick_xml::NsReader<&'a [u8]>,
+    /// The first element's namespace.
+    namespace: Option<String>,
+    open: Vec<Open>,
     /// The empty element that ends with the next step.
     ends: bool,
 }
@@ -80,7 +97,8 @@ impl<'a> Document<'a> {
         Self {
             part,
             text,
-            reader: quick_xml::Reader::from_str(text),
+            reader: quick_xml::NsReader::from_str(text),
+            namespace: None,
             open: Vec::new(),
             ends: false,
         }
@@ -94,13 +112,13 @@ impl<'a> Document<'a> {
         loop {
             match self.reader.read_event() {
                 Ok(Event::Start(start)) => {
-                    self.begin(&start)?;
-                    return Ok(Step::Start(Element { start }));
+                    let foreign = self.begin(&start)?;
+                    return Ok(Step::Start(Element { start, foreign }));
                 }
                 Ok(Event::Empty(start)) => {
-                    self.begin(&start)?;
+                    let foreign = self.begin(&start)?;
                     self.ends = true;
-                    return Ok(Step::Start(Element { start }));
+                    return Ok(Step::Start(Element { start, foreign }));
                 }
                 Ok(Event::End(_)) => return self.end(),
                 Ok(Event::Text(text)) => self.add(&text),
@@ -109,12 +127,19 @@ impl<'a> Document<'a> {
                 Ok(Event::Eof) if self.open.is_empty() => return Ok(Step::Done),
                 Ok(Event::Eof) => return Err(self.fault("the XML ends here: it was cut short")),
                 Ok(_) => {}
+                Err(quick_xml::Error::Namespace(NamespaceError::TooManyBindings(most))) => {
+                    let what = format!(
+                        "the XML names more than {most} namespaces; export it as a plain mesh"
+                    );
+                    return Err(self.fault(what));
+                }
                 Err(error) => return Err(self.fault(format!("the XML is damaged: {error}"))),
             }
         }
     }
 
-    fn begin(&mut self, start: &BytesStart<'_>) -> Result<(), ReadError> {
+    /// Notes an element that begins, and whether it is foreign.
+    fn begin(&mut self, start: &BytesStart<'_>) -> Result<bool, ReadError> {
         if self.open.len() >= DEEPEST {
             return Err(self.fault(format!("elements are nested more than {DEEPEST} deep")));
         }
@@ -122,9 +147,24 @@ impl<'a> Document<'a> {
         if let Some(error) = start.attributes().with_checks(false).find_map(Result::err) {
             return Err(self.fault(format!("the XML is damaged: {error}")));
         }
-        let name = local(start.name().into_inner()).to_owned();
-        self.open.push((name, String::new()));
-        Ok(())
+        let namespace = match self.reader.resolver().resolve_element(start.name()).0 {
+            ResolveResult::Bound(namespace) => Some(namespace.into_inner().to_owned()),
+            ResolveResult::Unbound => None,
+            ResolveResult::Unknown(prefix) => Some(prefix),
+        };
+        let foreign = match self.open.last() {
+            Some(around) => around.foreign || namespace != self.namespace,
+            None => {
+                self.namespace = namespace;
+                false
+            }
+        };
+        self.open.push(Open {
+            name: local(start.name().into_inner()).to_owned(),
+            text: String::new(),
+            foreign,
+        });
+        Ok(foreign)
     }
 
     /// A character by its number or by one of XML's five names. Others are not replaced, but what
@@ -138,7 +178,7 @@ impl<'a> Document<'a> {
     }
 
     fn add(&mut self, text: &str) {
-        if let Some((_, own)) = self.open.last_mut()
+        if let Some(Open { text: own, .. }) = self.open.last_mut()
             && !(own.is_empty() && text.trim().is_empty())
         {
             own.push_str(text);
@@ -146,11 +186,15 @@ impl<'a> Document<'a> {
     }
 
     fn end(&mut self) -> Result<Step<'a>, ReadError> {
-        let Some((name, mut text)) = self.open.pop() else {
+        let Some(mut ended) = self.open.pop() else {
             return Err(self.fault("an element ends that did not begin"));
         };
-        text.truncate(text.trim_end().len());
-        Ok(Step::End { name, text })
+        ended.text.truncate(ended.text.trim_end().len());
+        Ok(Step::End {
+            name: ended.name,
+            text: ended.text,
+            foreign: ended.foreign,
+        })
     }
 
     /// A fault at the place that was read last.

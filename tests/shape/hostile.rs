@@ -102,17 +102,20 @@ fn entities_of_xml_are_not_replaced() {
 
 #[test]
 fn extensions_without_end_are_refused() {
-    let spaces: String = (0..20_000)
-        .map(|k| format!(" xmlns:p{k}=\"/core/\""))
-        .collect();
-    let required: String = (0..20_000).map(|k| format!("p{k} ")).collect();
     let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
-    let open = format!("<model{spaces} requiredextensions=\"{required}\" ");
-    let message = refusal(
-        SurfaceFormat::ThreeMf,
-        &three_mf_of(&model.replacen("<model ", &open, 1)),
-    );
-    assert!(message.contains("more than 64 extensions"), "{message}");
+    for (count, said) in [
+        (100, "more than 64 extensions"),
+        (20_000, "more than 128 namespaces"),
+    ] {
+        let spaces: String = (0..count)
+            .map(|k| format!(" xmlns:p{k}=\"/core/\""))
+            .collect();
+        let required: String = (0..count).map(|k| format!("p{k} ")).collect();
+        let open = format!("<model{spaces} requiredextensions=\"{required}\" ");
+        let text = model.replacen("<model ", &open, 1);
+        let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&text));
+        assert!(message.contains(said), "{message}");
+    }
 }
 
 #[test]

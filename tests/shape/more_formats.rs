@@ -50,6 +50,37 @@ fn the_items_that_a_3mf_file_builds_are_listed() {
     assert_eq!((names, triangles), (vec!["object 2", "a lid"], 8));
 }
 
+/// A vendor's vertices were taken for the model's, and shifted the numbers of all that followed.
+#[test]
+fn elements_of_other_namespaces_in_a_3mf_file_are_no_part_of_its_bodies() {
+    let core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+    let model = String::from_utf8(three_mf_model("inch")).unwrap();
+    let model = model.replace("<model ", &format!("<model xmlns=\"{core}\" "));
+    let triangles =
+        |model: &str| read(SurfaceFormat::ThreeMf, &three_mf_of(model)).map(|file| file.triangles);
+    let plain = triangles(&model).unwrap();
+    let foreign = [
+        "<v:vertex xmlns:v=\"http://vendor.example/x\" x=\"9\" y=\"9\" z=\"9\"/>",
+        "<vertex xmlns=\"http://vendor.example/x\" x=\"9\" y=\"9\" z=\"9\"/>",
+        "<v:old xmlns:v=\"http://vendor.example/x\"><v:object/><vertex x=\"9\" y=\"9\" z=\"9\"/></v:old>",
+    ];
+    for element in foreign {
+        let with = model.replace("<vertices>", &format!("<vertices>{element}"));
+        assert_eq!(triangles(&with).unwrap(), plain, "{element}");
+    }
+    // The core's own namespace under a prefix.
+    let prefixed = model
+        .replace('<', "<c:")
+        .replace("<c:/", "</c:")
+        .replace("<c:?", "<?");
+    let prefixed = prefixed.replace("xmlns=", "xmlns:c=");
+    assert_eq!(triangles(&prefixed).unwrap(), plain);
+    // An object that an extension makes is refused as before.
+    let lattice = "<b:beamlattice xmlns:b=\"http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02\"/>";
+    let lattice = model.replace("</triangles>", &format!("</triangles>{lattice}"));
+    assert!(triangles(&lattice).is_err());
+}
+
 #[test]
 fn every_further_format_gives_the_same_body() {
     use SurfaceFormat::{Amf, Glb, Obj, Off, Ply};
