@@ -251,6 +251,54 @@ fn regression_points_without_coarser_ones_stated_no_error() {
     }
 }
 
+/// The deviation of all points was stated as that between the jumps, beside which heights are off by the jump.
+#[test]
+fn graded_points_state_the_jumps_that_no_patch_follows() {
+    let place = Place::new();
+    // Two blocks side by side: a step of 10 mm at x = 4.7 mm.
+    let mut stl = String::from("solid step\n");
+    for ([from, to], top) in [([-20.0, 4.7], 30.0), ([4.7, 20.0], 40.0)] {
+        for corners in [
+            [[from, -20.0], [to, -20.0], [to, 20.0]],
+            [[from, -20.0], [to, 20.0], [from, 20.0]],
+        ] {
+            stl += "facet normal 0 0 1 outer loop\n";
+            for [x, y] in corners {
+                stl += &format!("vertex {x} {y} {top}\n");
+            }
+            stl += "endloop endfacet\n";
+        }
+    }
+    place.write("step.stl", &(stl + "endsolid\n"));
+    let args = [
+        "discretize",
+        "step.stl",
+        "--unit",
+        "mm",
+        "--max-deviation",
+        "2mm",
+    ];
+    let said = place.run(&args).ends(0);
+    let summary: serde_json::Value = serde_json::from_slice(&place.read("points.json")).unwrap();
+    let patches = summary["border_patches"].as_u64().unwrap();
+    let width_m = summary["border_width_m"].as_f64().unwrap();
+    assert!(patches > 0 && width_m > 0.0 && width_m <= 2e-3, "{summary}");
+    assert_eq!(summary["accuracy"]["borders"]["estimate"], width_m);
+    let stated = format!("but for patches at rims and jumps: {patches}, no wider than");
+    assert!(said.out.contains(&stated), "{said:?}");
+    assert!(said.out.contains("points.csv, points.json"), "{said:?}");
+    let smooth = [
+        "discretize",
+        "shapes/flat.toml",
+        "--max-deviation",
+        "2mm",
+        "--out",
+        "flat.csv",
+    ];
+    let said = place.run(&smooth).ends(0);
+    assert!(!said.out.contains("jumps"), "{said:?}");
+}
+
 /// An image of 15 kB took 4.5 GB under `--memory 1GB`.
 #[test]
 fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {

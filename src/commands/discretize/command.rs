@@ -243,6 +243,17 @@ impl Discretize {
         }
     }
 
+    /// Names the table and its summary; a device or a pipe has no summary beside it.
+    fn written_to(&self, sheet: &mut Sheet) {
+        if let FileArgument::Path(path) = &self.out {
+            let mut written = path.display().to_string();
+            if !atomic::is_stream(path) {
+                written += &format!(", {}", path.with_extension("json").display());
+            }
+            sheet.line("written to", &written);
+        }
+    }
+
     fn text_scattered(&self, summary: &ScatteredSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {}, {}",
@@ -259,9 +270,15 @@ impl Discretize {
             &format!("{} mm^2 in plan", number(summary.area_m2 * 1e6)),
         );
         if let Some(stage) = summary.accuracy.get("patches") {
+            let borders = summary.border_patches.zip(summary.border_width_m);
+            let borders = borders.filter(|(patches, _)| *patches > 0);
+            let borders = borders.map_or_else(String::new, |(patches, width_m)| {
+                let widest = mm(width_m);
+                format!(", but for patches at rims and jumps: {patches}, no wider than {widest}")
+            });
             sheet.line(
                 "deviation",
-                &format!("at most {} vertically", mm(stage.estimate)),
+                &format!("at most {} vertically{borders}", mm(stage.estimate)),
             );
         }
         if let Some(cover_m) = summary.cover_m {
@@ -270,9 +287,7 @@ impl Discretize {
                 &format!("no place farther than {} from a point", mm(cover_m)),
             );
         }
-        if let FileArgument::Path(path) = &self.out {
-            sheet.line("written to", &path.display().to_string());
-        }
+        self.written_to(&mut sheet);
         sheet.finish()
     }
 
@@ -337,13 +352,7 @@ impl Discretize {
             let facets = summary.accuracy.get("tessellation");
             sheet.line("accuracy", &heights_to(stage, facets));
         }
-        if let FileArgument::Path(path) = &self.out {
-            let summary = path.with_extension("json");
-            sheet.line(
-                "written to",
-                &format!("{}, {}", path.display(), summary.display()),
-            );
-        }
+        self.written_to(&mut sheet);
         if let Some(FileArgument::Path(path)) = &self.plot {
             sheet.line("drawn in", &path.display().to_string());
         }

@@ -78,13 +78,16 @@ pub struct ScatteredSummary {
     /// Adaptive: bilinear patches within the deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patches: Option<usize>,
-    /// Adaptive: patches at a rim or a jump, no wider than the deviation.
+    /// Adaptive: patches at a rim or a jump, whose heights nothing bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_patches: Option<usize>,
+    /// Adaptive: the widest of these, m; 0 without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub border_width_m: Option<f64>,
     /// Poisson: no place of the surface lies farther from a point in plan, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cover_m: Option<f64>,
-    /// `points` (rounding), and for adaptive points `patches`.
+    /// `points` (rounding), and for adaptive points `patches`; `borders` where patches are at rims or jumps.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
@@ -123,7 +126,8 @@ pub fn run(
         "points",
         stage(rounding_m, "a-priori: the file's coordinate rounding"),
     )]);
-    let (mut patches, mut border_patches, mut cover_m) = (None, None, None);
+    let (mut patches, mut border_patches, mut border_width_m) = (None, None, None);
+    let mut cover_m = None;
     let (mut points, name) = match sampling {
         Sampling::Adaptive {
             max_deviation_m,
@@ -135,9 +139,15 @@ pub fn run(
             };
             let found = adaptive(&probe, grading, progress).map_err(failed)?;
             (patches, border_patches) = (Some(found.leaves), Some(found.borders));
-            let method = "certified: the vertical difference between surface and bilinear patches; \
-                          at rims and jumps patches no wider than the deviation asked for";
+            border_width_m = Some(found.border_m);
+            let method = "certified: the vertical difference between surface and bilinear patches, but \
+                          for those at rims and jumps";
             accuracy.insert("patches", stage(found.vertical_m, method));
+            if found.borders > 0 {
+                let method = "known: the widest patch at a rim or a jump, so far in plan; heights there \
+                              may be off by all of the jump";
+                accuracy.insert("borders", stage(found.border_m, method));
+            }
             (found.points, "adaptive")
         }
         Sampling::Poisson { spacing_m, seed } => {
@@ -161,6 +171,7 @@ pub fn run(
         max_height_m: points.height_m.iter().copied().fold(0.0, f64::max),
         patches,
         border_patches,
+        border_width_m,
         cover_m,
         accuracy,
         warnings,
