@@ -25,6 +25,8 @@ pub(super) const MOST_MET: usize = 20_000_000;
 const CELLS: usize = 101;
 /// Of a facet's area this share at least must show in plan for it to face up or down.
 const LEVEL: f64 = 1e-6;
+/// Shares of hidden area beyond this are worth a warning.
+const MOST_HIDDEN: f64 = 0.01;
 /// Depths below this share of the surface's height count as seen.
 const DEPTH: f64 = 1e-6;
 
@@ -33,9 +35,9 @@ const DEPTH: f64 = 1e-6;
 pub struct Hidden {
     /// Not seen from above: below other parts of the surface, or facing down as a body's underside.
     pub of_area: f64,
-    /// Of the area that faces up, what lies under other parts of the surface: undercuts, hollows; 0 where
-    /// facets of an open surface look to different sides, which leaves open what faces up.
-    pub of_upward: f64,
+    /// Of the area that faces up, what lies under other parts of the surface: undercuts, hollows; `None`
+    /// (null) where facets of an open surface look to different sides, which leaves open what faces up.
+    pub of_upward: Option<f64>,
 }
 
 impl Hidden {
@@ -45,6 +47,29 @@ impl Hidden {
         match surface {
             Surface::Mesh(mesh) => Some(of_mesh(mesh)),
             Surface::Primitive(_) => None,
+        }
+    }
+
+    /// What a user of the height map should know, if it hides more than a hundredth.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        let share = |share: f64| format!("{:.0} %", 100.0 * share);
+        match self.of_upward {
+            Some(of_upward) => (of_upward > MOST_HIDDEN).then(|| {
+                format!(
+                    "{} of the area that faces up lies under other parts of the surface (undercuts, hollows): \
+                     a height map shows the uppermost alone",
+                    share(of_upward)
+                )
+            }),
+            None => (self.of_area > MOST_HIDDEN).then(|| {
+                format!(
+                    "{} of the area lies under other parts of the surface; whether that faces up (undercuts, \
+                     hollows) is unknown, because the surface is open and its facets look to different sides: \
+                     a height map shows the uppermost alone",
+                    share(self.of_area)
+                )
+            }),
         }
     }
 }
@@ -116,11 +141,10 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         .map(look)
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
-    let of_upward = share(sums[3], sums[2]);
-    let unknown = of_upward > 0.0 && !closed && disagrees(mesh);
+    let unknown = sums[1] > 0 && !closed && disagrees(mesh);
     Hidden {
         of_area: share(sums[1], sums[0]),
-        of_upward: if unknown { 0.0 } else { of_upward },
+        of_upward: (!unknown).then(|| share(sums[3], sums[2])),
     }
 }
 
@@ -235,7 +259,7 @@ mod tests {
             [4.1, 0.0],
         ]);
         let found = Hidden::of(&washer).unwrap();
-        assert!(found.of_upward < 1e-3, "{found:?}");
+        assert!(found.of_upward.unwrap() < 1e-3, "{found:?}");
         // A mushroom: of the foot's upper side, from 2 to 5, all lies under the cap of radius 6.
         let mushroom = turned(&[
             [5.0, 0.0],
@@ -249,7 +273,10 @@ mod tests {
         ]);
         let found = Hidden::of(&mushroom).unwrap();
         let share = (25.0 - 4.0) / (25.0 - 4.0 + 36.0 - 0.01);
-        assert!((found.of_upward - share).abs() < 0.01, "{found:?} {share}");
+        assert!(
+            (found.of_upward.unwrap() - share).abs() < 0.01,
+            "{found:?} {share}"
+        );
     }
 
     /// Within reach of its upper border a steep facet hid its neighbour.
@@ -282,8 +309,15 @@ mod tests {
         };
         let washer = [[6.5, 0.0], [6.5, 5.3], [3.35, 5.3], [3.35, 0.0]];
         let found = mixed(&washer, true);
-        assert!(found.of_upward < 1e-3 && found.of_area > 0.15, "{found:?}");
-        assert_eq!(mixed(&washer, false).of_upward, 0.0);
+        assert!(
+            found.of_upward.unwrap() < 1e-3 && found.of_area > 0.15,
+            "{found:?}"
+        );
+        assert_eq!(found.warning(), None);
+        // An unknown share was reported as none, without a warning.
+        let open = mixed(&washer, false);
+        assert_eq!(open.of_upward, None);
+        assert!(open.warning().unwrap().contains("unknown"), "{open:?}");
         let mushroom = [
             [5.0, 0.0],
             [5.0, 1.0],
@@ -297,7 +331,7 @@ mod tests {
         let plain = Hidden::of(&turned(&mushroom)).unwrap();
         let found = mixed(&mushroom, true);
         assert!(
-            (found.of_upward - plain.of_upward).abs() < 2e-3,
+            (found.of_upward.unwrap() - plain.of_upward.unwrap()).abs() < 2e-3,
             "{found:?} {plain:?}"
         );
     }

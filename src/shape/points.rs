@@ -24,8 +24,6 @@ use fluxform_numerics::axis::Axis;
 const MOST_POINTS: usize = 100_000_000;
 /// Grids of more points than this are not compared with their surface: it would take minutes.
 const MOST_CERTIFIED: usize = 4_000_000;
-/// Shares of hidden area beyond this are worth a warning.
-const MOST_HIDDEN: f64 = 0.01;
 /// Points marked between two looks at the progress.
 const MARKED_BETWEEN_LOOKS: usize = 4096;
 
@@ -288,16 +286,7 @@ pub fn discretize_surface(
     } else {
         None
     };
-    if let Some(share) = hidden
-        .map(|hidden| hidden.of_upward)
-        .filter(|s| *s > MOST_HIDDEN)
-    {
-        warnings.push(format!(
-            "{:.0} % of the area that faces up lies under other parts of the surface (undercuts, \
-             hollows): a height map shows the uppermost alone",
-            100.0 * share
-        ));
-    }
+    warnings.extend(hidden.and_then(|hidden| hidden.warning()));
     let certificate = certified(surface, &grid, &samples, settings, &mut warnings, progress)?;
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
         by_cell(surface, &grid, &samples, settings.certify_seconds, progress)?

@@ -299,6 +299,52 @@ fn graded_points_state_the_jumps_that_no_patch_follows() {
     assert!(!said.out.contains("jumps"), "{said:?}");
 }
 
+/// Points on no grid came without the warning, and an unknown share was reported as none.
+#[test]
+fn what_a_height_map_hides_is_a_warning_however_the_points_are_chosen() {
+    let place = Place::new();
+    // A double pyramid over a slab.
+    let vertices = "-20 -20 0\n20 -20 0\n20 20 0\n-20 20 0\n-20 -20 10\n20 -20 10\n20 20 10\n-20 20 10\n\
+                    12 0 30\n0 12 30\n-12 0 30\n0 -12 30\n0 0 40\n0 0 22\n";
+    let faces = "2 1 0\n3 2 0\n4 5 6\n4 6 7\n0 1 5\n0 5 4\n1 2 6\n1 6 5\n2 3 7\n2 7 6\n3 0 4\n3 4 7\n\
+                 8 9 12\n9 10 12\n10 11 12\n11 8 12\n9 8 13\n10 9 13\n11 10 13\n8 11 13\n";
+    let off = |faces: &str| {
+        let faces = faces.replace('\n', "\n3 ");
+        let count = faces.lines().count() - 1;
+        format!(
+            "OFF\n14 {count} 0\n{vertices}3 {}\n",
+            faces.trim_end_matches("3 ")
+        )
+    };
+    place.write("whole.off", &off(faces));
+    for flags in [
+        ["--grid", "9x9"],
+        ["--max-deviation", "4mm"],
+        ["--poisson", "4mm"],
+    ] {
+        let args = ["discretize", "whole.off", "--unit", "mm", "--out", "-"];
+        let said = place.run(&[&args[..], &flags].concat()).ends(0);
+        said.says(&["of the area that faces up lies under other parts"]);
+    }
+    // One facet turned round, and one missing.
+    let broken = faces
+        .replacen("2 1 0\n", "2 0 1\n", 1)
+        .replacen("1 2 6\n", "", 1);
+    place.write("broken.off", &off(&broken));
+    let args = ["discretize", "broken.off", "--unit", "mm", "--inspect"];
+    let said = place.run(&args).ends(0);
+    assert!(said.out.contains("an unknown share"), "{said:?}");
+    let json = place
+        .run(&[&args[..], &["--format", "json"]].concat())
+        .json();
+    assert!(json["hidden"]["of_upward"].is_null(), "{json}");
+    let args = ["discretize", "broken.off", "--unit", "mm", "--out", "-"];
+    place
+        .run(&args)
+        .ends(0)
+        .says(&["is unknown, because the surface is open"]);
+}
+
 /// An image of 15 kB took 4.5 GB under `--memory 1GB`.
 #[test]
 fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {

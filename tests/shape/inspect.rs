@@ -120,7 +120,7 @@ fn walls_that_lean_within_the_files_rounding_hide_nothing() {
         let found = hidden(inset);
         let off = found.of_area - 1.0 / 6.0;
         assert!(
-            found.of_upward == 0.0 && off.abs() < 0.01,
+            found.of_upward == Some(0.0) && off.abs() < 0.01,
             "{inset}: {found:?}"
         );
     }

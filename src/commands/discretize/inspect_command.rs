@@ -128,12 +128,18 @@ impl Discretize {
             );
         }
         if let Some(hidden) = &inspection.hidden {
+            let of_upward = hidden.of_upward.map_or_else(
+                || {
+                    "an unknown share (facets of an open surface look to different sides)"
+                        .to_owned()
+                },
+                |share| format!("{} %", number((1000.0 * share).round() / 10.0)),
+            );
             sheet.line(
                 "hidden",
                 &format!(
-                    "{} % of the area from above, {} % of what faces up (undercuts, hollows)",
-                    number((100.0 * hidden.of_area).round()),
-                    number((1000.0 * hidden.of_upward).round() / 10.0)
+                    "{} % of the area from above, {of_upward} of what faces up (undercuts, hollows)",
+                    number((100.0 * hidden.of_area).round())
                 ),
             );
         }

@@ -15,6 +15,7 @@ use crate::progress::Progress;
 use crate::scene::sources::Sampling;
 use crate::shape::ShapeError;
 use crate::shape::document::ShapeDocument;
+use crate::shape::hidden::Hidden;
 use crate::shape::points::requested_grid;
 use crate::shape::scattered::adaptive::{Grading, adaptive};
 use crate::shape::scattered::poisson::poisson;
@@ -75,6 +76,9 @@ pub struct ScatteredSummary {
     pub min_height_m: f64,
     /// Highest height, m.
     pub max_height_m: f64,
+    /// How much of the surface a height map cannot show; absent for a primitive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<Hidden>,
     /// Adaptive: bilinear patches within the deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patches: Option<usize>,
@@ -109,7 +113,7 @@ pub fn run(
     let made_with = sampling.made_with(document, inputs.first());
     let OpenedSurface {
         surface,
-        warnings,
+        mut warnings,
         inputs,
         ..
     } = OpenedSurface::new(document, inputs, progress)?;
@@ -157,6 +161,8 @@ pub fn run(
         }
     };
     let lowest_m = check_heights(&mut points, rounding_m).map_err(failed)?;
+    let hidden = Hidden::of(&surface);
+    warnings.extend(hidden.and_then(|hidden| hidden.warning()));
     let summary = ScatteredSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -169,6 +175,7 @@ pub fn run(
         marks: MarkCounts::of(&points.marks),
         min_height_m: lowest_m.max(0.0),
         max_height_m: points.height_m.iter().copied().fold(0.0, f64::max),
+        hidden,
         patches,
         border_patches,
         border_width_m,
