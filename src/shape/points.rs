@@ -398,6 +398,13 @@ fn certified(
         Some(known) => Some(known.clone()),
         None => certify(surface, grid, samples, how, seconds, progress)?,
     };
+    if how == Certify::Distance && matches!(surface, Surface::Primitive(_)) {
+        warnings.push(
+            "the Hausdorff distance is computed of files alone, and this surface is a formula: the vertical \
+             difference is certified, the distance is not; give the surface as a mesh file for --certify distance"
+                .into(),
+        );
+    }
     if certificate.is_none() {
         warnings.push(
             "the effort of a certificate is spent: so many triangles lie over each other that how \

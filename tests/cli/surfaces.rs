@@ -345,6 +345,19 @@ fn what_a_height_map_hides_is_a_warning_however_the_points_are_chosen() {
         .says(&["is unknown, because the surface is open"]);
 }
 
+/// The request was passed over without a word.
+#[test]
+fn a_distance_that_is_not_certified_of_a_formula_is_a_warning() {
+    let place = Place::new();
+    let shape = "name = \"ball\"\nprimitive = \"half-sphere\"\n[points]\nx_mm = [-40, 40, 7]\ny_mm = [-40, 40, 7]\n";
+    place.write("ball.toml", shape);
+    let args = ["discretize", "ball.toml", "--out", "-", "--certify"];
+    let said = place.run(&[&args[..], &["distance"]].concat()).ends(0);
+    said.says(&["Hausdorff", "this surface is a formula", "mesh file"]);
+    let said = place.run(&[&args[..], &["vertical"]].concat()).ends(0);
+    assert!(!said.err.contains("Hausdorff"), "{said:?}");
+}
+
 /// An image of 15 kB took 4.5 GB under `--memory 1GB`.
 #[test]
 fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {

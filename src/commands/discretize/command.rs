@@ -81,7 +81,8 @@ pub struct Discretize {
     #[arg(long, hide_short_help = true, default_value = Holes::default().name(), value_parser = values::named::<Holes>(),
           conflicts_with_all = ON_NO_GRID)]
     holes: Holes,
-    /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
+    /// Compare the points with the surface: vertically, by the Hausdorff distance too (of files alone),
+    /// or not
     #[arg(long, hide_short_help = true, default_value = Certify::Vertical.name(), value_parser = values::named::<Certify>(),
           conflicts_with_all = ON_NO_GRID)]
     certify: Certify,
