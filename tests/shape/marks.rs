@@ -488,6 +488,31 @@ fn blue_noises_areas_add_up_to_the_bodys() {
     }
 }
 
+/// Cells that were counted whole left the areas 5 % off (rms), 16 % at most.
+#[test]
+fn blue_noises_weights_are_the_areas_nearest_to_each_point() {
+    let surface = shape("flat");
+    let region = grid((-0.05, 0.01, 3), (-0.04, 0.03, 3));
+    let found = poisson(&Probe::new(&surface, &region), 5e-3, 3, &Silent).unwrap();
+    let points = &found.points;
+    let step_m = 1e-4;
+    let mut area_m2 = vec![0.0; points.len()];
+    for k in 0..600 * 700 {
+        let [x, y] = [k % 600, k / 600].map(|n| (n as f64 + 0.5) * step_m);
+        let apart = |p: &usize| (points.x_m[*p] - x + 0.05).hypot(points.y_m[*p] - y + 0.04);
+        let nearest = (0..points.len()).min_by(|p, q| apart(p).total_cmp(&apart(q)));
+        area_m2[nearest.unwrap()] += step_m * step_m;
+    }
+    let off = points
+        .weight_m2
+        .iter()
+        .zip(&area_m2)
+        .map(|(weight, area)| weight / area - 1.0);
+    let squares: f64 = off.map(|off| off * off).sum();
+    let rms = (squares / points.len() as f64).sqrt();
+    assert!(rms < 0.012, "{rms}");
+}
+
 /// Darts seldom hit what is narrow; what lay far from all of them was not counted.
 #[test]
 fn blue_noise_leaves_no_part_of_a_narrow_strip_out() {
