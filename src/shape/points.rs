@@ -298,17 +298,17 @@ pub fn discretize_surface(
             Some(*mesh.facts()),
             mesh.read_by().map(str::to_owned),
             if stated_tessellation(mesh.facts()).is_some() {
-                "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
-                 multiplies it)"
+                "a-priori: the file's coordinate rounding, in plan times the steepest slope at a point (exact \
+                 heights of its triangles)"
             } else {
-                "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
-                 multiplies it; the tessellation's own deviation is not in the file)"
+                "a-priori: the file's coordinate rounding, in plan times the steepest slope at a point (exact \
+                 heights of its triangles; the tessellation's own deviation is not in the file)"
             },
         ),
         Surface::Primitive(_) => (None, None, "a-priori: a closed formula in double precision"),
     };
     let accuracy = StageAccuracy {
-        estimate: rounding_m,
+        estimate: surface.heights_rounding_m(&points.normal),
         relative_to: "1 m".into(),
         method: method.into(),
     };

@@ -17,6 +17,7 @@ use crate::primitive::PlacedPrimitive;
 use crate::read_error::ReadError;
 use crate::step;
 use crate::stl;
+use crate::vertical_hit::WALL_NORMAL_Z;
 use crate::zeros::Zeros;
 use fluxform_base::progress::Progress;
 use fluxform_design::named_file::{self, NamedFileError};
@@ -119,7 +120,22 @@ impl Surface {
         }
     }
 
-    /// How far a height of the surface may lie from what was meant, by its number format, m.
+    /// How far heights with these unit normals may lie from what was meant, by the file's number format, m: a
+    /// slope turns the rounding in plan into one of height.
+    #[must_use]
+    pub fn heights_rounding_m(&self, normals: &[[f64; 3]]) -> f64 {
+        let plan_m = match self {
+            Self::Mesh(mesh) => mesh.facts().plan_rounding_m,
+            Self::Primitive(_) => 0.0,
+        };
+        let slopes = normals
+            .iter()
+            .filter(|[_, _, z]| *z > WALL_NORMAL_Z)
+            .map(|[x, y, z]| (x.abs() + y.abs()) / z);
+        self.height_rounding_m() + plan_m * slopes.fold(0.0, f64::max)
+    }
+
+    /// How far a height on a level face may lie from what was meant, by the number format, m.
     #[must_use]
     pub fn height_rounding_m(&self) -> f64 {
         match self {

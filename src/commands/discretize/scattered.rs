@@ -120,16 +120,8 @@ pub fn run(
     let failed = |source: ShapeError| shape_error(document, source);
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
     let probe = Probe::new(&surface, &grid);
-    let stage = |estimate: f64, method: &str| StageAccuracy {
-        estimate,
-        relative_to: "1 m".to_owned(),
-        method: method.to_owned(),
-    };
     let rounding_m = surface.height_rounding_m();
-    let mut accuracy = BTreeMap::from([(
-        "points",
-        stage(rounding_m, "a-priori: the file's coordinate rounding"),
-    )]);
+    let mut accuracy = BTreeMap::new();
     let (mut patches, mut border_patches, mut border_width_m) = (None, None, None);
     let mut cover_m = None;
     let (mut points, name) = match sampling {
@@ -161,6 +153,10 @@ pub fn run(
         }
     };
     let lowest_m = check_heights(&mut points, rounding_m).map_err(failed)?;
+    let method =
+        "a-priori: the file's coordinate rounding, in plan times the steepest slope at a point";
+    let heights_m = surface.heights_rounding_m(&points.normal);
+    accuracy.insert("points", stage(heights_m, method));
     let hidden = Hidden::of(&surface);
     warnings.extend(hidden.and_then(|hidden| hidden.warning()));
     let summary = ScatteredSummary {
@@ -185,6 +181,15 @@ pub fn run(
         files: Vec::new(),
     };
     Ok(ScatteredReport { points, summary })
+}
+
+/// An error in m.
+fn stage(estimate: f64, method: &str) -> StageAccuracy {
+    StageAccuracy {
+        estimate,
+        relative_to: "1 m".to_owned(),
+        method: method.to_owned(),
+    }
 }
 
 /// The lowest height as it was, m. Heights that are below zero by rounding become zero.
