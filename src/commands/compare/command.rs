@@ -25,8 +25,9 @@ use crate::design::Need;
 /// force is lambda h(x, y), by currents of least power, the nearest force where the limits bind and
 /// none beside the object. A difference of two forces is stated in units of what a finger just
 /// notices: a part (--jnd) of the larger force, but at least 0.8 mN; where one object gives no force
-/// and the other a strong one it is 1/jnd, where both push against each other up to twice that. A
-/// lambda that is null ends with exit code 4.
+/// and the other a strong one it is 1/jnd, where both push against each other up to twice that. Means
+/// and shares count either surface half, and all points of a surface alike. A lambda that is null ends
+/// with exit code 4.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[
     ("fluxform compare designs/seed_air.toml shapes/flat.toml shapes/wedge.toml",
