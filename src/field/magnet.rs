@@ -125,9 +125,9 @@ pub enum NoRule {
     #[error("the magnet's size, its distance and the tolerance must be positive numbers")]
     NotANumber,
     /// The magnet touches a source or overlaps it.
-    #[error("the magnet touches a field source or overlaps it, by up to {:.3} mm", gap_m.abs() * 1e3)]
+    #[error("the magnet is {} mm from a field source (below 0: overlaps it), where there is no rule", 1e3 * gap_m)]
     Touches {
-        /// Gap between magnet and source, m.
+        /// Gap between magnet and source, m; not positive.
         gap_m: f64,
     },
     /// The gap to the nearest source is too small for the tolerance.

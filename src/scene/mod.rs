@@ -38,7 +38,7 @@ use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
 use crate::field::batch::Gradients;
 use crate::field::components::Components;
 use crate::field::dipole;
-use crate::field::magnet::{Cylinder, MagnetRule, Sources};
+use crate::field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
@@ -111,9 +111,13 @@ pub(crate) fn magnet_rule(
         height_m: lowest_m - top_m,
     };
     MagnetRule::cylinder(size, moment_a_m2, sources, tolerance).map_err(|fault| {
+        let or = match fault {
+            NoRule::TooClose { .. } => ", give a larger --tolerance,",
+            NoRule::NotANumber | NoRule::Touches { .. } => "",
+        };
         RunError::Input(format!(
             "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
-             {fault}; raise the magnet, or use model = \"dipole\"",
+             {fault}; raise the magnet{or} or use model = \"dipole\"",
             lowest_m * 1e3
         ))
     })
