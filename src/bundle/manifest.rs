@@ -214,6 +214,15 @@ pub struct ArrayGeometry {
     pub gain: Vec<f64>,
 }
 
+impl CurrentLimits {
+    /// Whether a `coil` carries all that it may, in either direction: at rest it does not.
+    #[must_use]
+    pub fn is_reached(&self, coil: usize, current_a: f64) -> bool {
+        let (min_a, max_a) = (self.current_min_a[coil], self.current_max_a[coil]);
+        current_a != 0.0 && (current_a >= max_a || current_a <= min_a)
+    }
+}
+
 /// Limits of the currents, one entry a coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CurrentLimits {
@@ -504,8 +513,21 @@ pub struct LeftOut {
 
 #[cfg(test)]
 mod tests {
-    use super::PointsGrid;
+    use super::{CurrentLimits, PointsGrid};
     use fluxform_numerics::axis::Axis;
+
+    /// A driver that only reverses, and one without any current, were at their limit at rest.
+    #[test]
+    fn a_coil_at_rest_has_reached_no_limit() {
+        let limits = CurrentLimits {
+            current_min_a: vec![-2.0, 0.0, 0.0],
+            current_max_a: vec![0.0, 1.3, 0.0],
+            total_current_max_a: None,
+        };
+        assert!([0, 1, 2].iter().all(|coil| !limits.is_reached(*coil, 0.0)));
+        assert!(limits.is_reached(0, -2.0) && limits.is_reached(1, 1.3));
+        assert!(!limits.is_reached(0, -1.9) && !limits.is_reached(1, 1.2));
+    }
 
     #[test]
     fn grid_rows_read_back() {

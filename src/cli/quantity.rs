@@ -52,7 +52,9 @@ pub fn si_with_error(value: f64, relative: f64, unit: &str) -> String {
     )
 }
 
-fn si_to(value: f64, unit: &str, digits: i32) -> String {
+/// The same with so many significant digits.
+#[must_use]
+pub fn si_to(value: f64, unit: &str, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value} {unit}");
     }

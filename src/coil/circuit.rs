@@ -190,7 +190,8 @@ impl Circuit {
 }
 
 /// The current farthest from zero, a positive one of two alike; 0 of none.
-pub(crate) fn farthest_from_zero(currents_a: impl IntoIterator<Item = f64>) -> f64 {
+#[must_use]
+pub fn farthest_from_zero(currents_a: impl IntoIterator<Item = f64>) -> f64 {
     let farther = |most: f64, next: f64| {
         let alike = next.abs() == most.abs();
         if next.abs() > most.abs() || (alike && next > most) {

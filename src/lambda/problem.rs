@@ -215,12 +215,15 @@ impl ForceProblem<'_> {
         weights.iter().copied().fold(0.0, f64::max)
     }
 
-    /// The directions of current of coil `i`; a driver without any counts as one that pushes.
+    /// The directions of current of coil `i`; a driver without any counts as one with currents above zero, beside
+    /// others that all have theirs below as one of those.
     pub(super) fn directions(&self, i: usize) -> Directions {
-        let down = self.lower_a[i] < 0.0;
+        let any = |limits_a: &[f64]| limits_a.iter().any(|limit_a| *limit_a != 0.0);
+        let (up, down) = (self.upper_a[i] > 0.0, self.lower_a[i] < 0.0);
+        let reversed = !up && !down && any(self.lower_a) && !any(self.upper_a);
         Directions {
-            up: self.upper_a[i] > 0.0 || !down,
-            down,
+            up: up || !(down || reversed),
+            down: down || reversed,
         }
     }
 

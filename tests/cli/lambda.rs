@@ -640,3 +640,63 @@ fn compare_renders_the_constants_that_lambda_reports() {
         "{text}"
     );
 }
+
+/// Regression: "push and pull" took the upper limits alone, and a coil without any current was one that pushes up beside
+/// others that all pull: constants were halved or zero where those of the mirror image are not.
+#[test]
+fn drivers_below_zero_mirror_those_above() {
+    let place = Place::new();
+    place.write(
+        "wedge.toml",
+        "name = \"wedge\"\nprimitive = \"wedge\"\nside_mm = 80\nlow_mm = 35\nhigh_mm = 65\n\
+         [points]\nx_mm = [-40, 40, 9]\ny_mm = [-40, 40, 9]\n",
+    );
+    let result = |polarity: &str, supply: &str| {
+        let design = format!(
+            "name = \"six\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 60\n\
+             [wire]\ndiameter_mm = 0.7\n[array]\nrows = 2\ncolumns = 3\npitch_mm = 50\n\
+             [magnet]\npolarity = \"{polarity}\"\n[supply]\n{supply}\n"
+        );
+        place.write("six.toml", &design);
+        let args = [
+            "lambda",
+            "six.toml",
+            "wedge.toml",
+            "--variants",
+            "--format",
+            "json",
+        ];
+        place.run(&args).json()
+    };
+    let pairs = [
+        [
+            "current_max_a = 2\ncurrent_min_a = -1",
+            "current_max_a = 1\ncurrent_min_a = -2",
+        ],
+        ["current_max_a = 2", "current_max_a = 0\ncurrent_min_a = -2"],
+        [
+            "current_max_a = [2, 2, 2, 0, 2, 2]",
+            "current_max_a = 0\ncurrent_min_a = [-2, -2, -2, 0, -2, -2]",
+        ],
+    ];
+    for [above, below] in pairs {
+        let constants = |result: &serde_json::Value| -> Vec<Option<f64>> {
+            let variants = result["variants"].as_array().unwrap().iter();
+            // Beside drivers of both directions one without any is taken to push up.
+            let mirrored =
+                variants.filter(|one| one["name"] != "push and pull" || !above.contains('['));
+            let all = mirrored.map(|variant| variant["lambda_n_per_m"].as_f64());
+            all.chain([result["lambda_n_per_m"].as_f64()]).collect()
+        };
+        let [expected, found] = [("repel", above), ("attract", below)]
+            .map(|(polarity, supply)| constants(&result(polarity, supply)));
+        assert_eq!(expected.len(), found.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            let near = match (found, expected) {
+                (Some(found), Some(expected)) => (found - expected).abs() <= 1e-9 * expected,
+                (found, expected) => found == expected,
+            };
+            assert!(near, "{below}: {found:?}, not {expected:?}");
+        }
+    }
+}

@@ -186,3 +186,28 @@ fn regression_an_array_that_misses_a_limit_left_the_ranges_of_the_search() {
     assert_eq!(least["certificate"]["ends"], Value::Array(Vec::new()));
     run.says(&["misses: settling in the array"]);
 }
+
+/// Regression: where the supply sets the current, less wire for the settling time is more heat: taking one excess off made
+/// the other, ever larger, until the written coil missed its own limit by 2e-5 and more.
+#[test]
+fn heat_and_settling_that_bind_together_are_both_met() {
+    let place = Place::new();
+    for (core, volt, watt, settling_ms) in [("[core]\nbelow_mm = 5\n", 9, 25, 200), ("", 7, 20, 20)]
+    {
+        let design = format!(
+            "name = \"both\"\n[wire]\ndiameter_mm = 0.9\n{core}[supply]\ncurrent_max_a = 4\nvoltage_v = {volt}\n\
+             [limits]\npower_max_w = {watt}\nsettling_max_ms = {settling_ms}\n"
+        );
+        place.write("both.toml", &design);
+        let args = ["optimize", "both.toml", "--format", "json"];
+        let found = place.run(&args).ends(0).json();
+        for limit in ["power_w", "settling_s"] {
+            let at = &found["limits"][limit];
+            let [value, most] = ["value", "limit"].map(|key| at[key].as_f64().unwrap());
+            assert!(
+                value <= most && value > most * (1.0 - 1e-6),
+                "{limit}: {at}"
+            );
+        }
+    }
+}

@@ -49,7 +49,7 @@ pub enum Refused {
     },
     /// The given design renders nothing that it could be compared with.
     #[error(
-        "the given design renders no force for {0}, so there is nothing to compare with: lower the shapes, or raise the limits of [supply]"
+        "the given design renders no force for {0}, so there is nothing to compare with: check magnet.polarity (\"repel\" for drivers that do not reverse), lower the shapes, or raise the limits of [supply]"
     )]
     NothingRendered(String),
 }

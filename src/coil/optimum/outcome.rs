@@ -298,7 +298,8 @@ impl Certificate {
 pub struct WireOutcome {
     /// Diameter over the insulation, m.
     pub wire_diameter_m: f64,
-    /// Its best force, N; `None` where no coil of it meets the limits.
+    /// Its best force, N, with a core to about a thousandth where another wire is better; `None` where no coil of it
+    /// meets the limits.
     pub force_n: Option<f64>,
 }
 

@@ -305,10 +305,9 @@ fn constants_table(report: &CalibrateReport) -> String {
 fn at_limit(bundle: &BundleReport) -> Option<String> {
     let currents = bundle.lambda.file.currents_a.as_ref()?;
     let limits = &bundle.manifest.limits;
-    let bound = currents
-        .iter()
-        .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
-        .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
+    let coils = currents.iter().enumerate();
+    let bound = coils
+        .filter(|(coil, current)| limits.is_reached(*coil, **current))
         .count();
     // Rounding may leave the sum a few bits below its limit.
     let sum: f64 = currents.iter().sum();

@@ -63,7 +63,9 @@ pub(super) fn all(
     let unwired = &posed.unwired;
     let (settings, wiring) = (&posed.options.settings, &posed.options.wiring);
     let voltage_v = posed.scene.design.supply.voltage_v;
-    let reversed_a: Vec<f64> = unwired.upper_a.iter().map(|u| -u).collect();
+    let limits_a = unwired.lower_a.iter().zip(unwired.upper_a);
+    let both_a: Vec<f64> = limits_a.map(|(lower, upper)| upper.max(-lower)).collect();
+    let reversed_a: Vec<f64> = both_a.iter().map(|most| -most).collect();
     let solve = |change: &Change, base: Option<f64>| {
         let problem = ForceProblem {
             offset_n: passive_n.filter(|_| change.offset),
@@ -71,6 +73,11 @@ pub(super) fn all(
                 &reversed_a
             } else {
                 unwired.lower_a
+            },
+            upper_a: if change.pulls {
+                &both_a
+            } else {
+                unwired.upper_a
             },
             ..*unwired
         };

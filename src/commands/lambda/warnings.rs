@@ -53,6 +53,8 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
         ),
         None => {}
     }
+    let chosen = solution.chosen.as_ref();
+    warnings.extend(chosen.and_then(|chosen| unbounded_sum(problem, &chosen.currents_a)));
     if !worst.complete {
         warnings.push(
             "the worst-point path could not be followed to its end: its numbers are not the \
@@ -68,6 +70,18 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
         );
     }
     warnings
+}
+
+/// That the currents' sum is further below zero than its limit, which bounds it from above alone.
+fn unbounded_sum(problem: &ForceProblem, currents_a: &[f64]) -> Option<String> {
+    let total_a = problem.total_max_a?;
+    let sum_a: f64 = currents_a.iter().sum();
+    (sum_a < -total_a).then(|| {
+        format!(
+            "the currents' sum is {sum_a:.3} A: total_current_max_a bounds it from above alone, at {total_a} A; \
+             where the supply cannot carry that below zero, lower current_min_a"
+        )
+    })
 }
 
 fn of_status(status: Status) -> Option<&'static str> {

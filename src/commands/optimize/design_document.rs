@@ -19,6 +19,8 @@ use crate::units::m_from_mm;
 
 /// Excess over a limit beyond which it is no rounding, relative.
 const ROUNDING: f64 = 1e-5;
+/// Relative steps by which slopes of the limits are found.
+const SLOPE_STEP: f64 = 1e-4;
 /// Most attempts to take it off.
 const ATTEMPTS: i32 = 12;
 /// The smallest bore, over the outer diameter: a design has one, a best coil may have none.
@@ -166,21 +168,20 @@ pub(super) fn write(
     task: &Task,
     tolerance: Option<f64>,
 ) -> Result<(WrittenDesign, Rated), RunError> {
-    let mut sizes = Sizes::new(best, task);
-    let mut attempt = 0;
-    loop {
+    let made = |sizes: Sizes| -> Result<Attempt, RunError> {
         let written = text_of(document, best, &sizes)?;
-        let mut rated = rated(&written.design, tolerance)?;
-        let over = excess(&rated, best.regime, task);
-        if over == 0.0 || over.abs() > ROUNDING || attempt == ATTEMPTS {
-            if document.design.limits.array_settling_max_s.is_some() {
-                of_rated(
-                    &Scene::with_tolerance(&written.design, tolerance)?,
-                    &mut rated,
-                )?;
-            }
-            return Ok((written, rated));
-        }
+        let rated = rated(&written.design, tolerance)?;
+        Ok(Attempt {
+            over: excess(&rated, best.regime, task),
+            sizes,
+            written,
+            rated,
+        })
+    };
+    let mut nearest = made(Sizes::new(best, task))?;
+    let (mut over, mut sizes) = (nearest.over, nearest.sizes);
+    let mut attempt = 0;
+    while over != 0.0 && over.abs() <= ROUNDING && attempt < ATTEMPTS {
         // The limits' own slopes are of order one.
         let by = (over.abs() * 2f64.powi(attempt)).max(2.3e-16);
         if over > 0.0 {
@@ -188,8 +189,90 @@ pub(super) fn write(
         } else {
             sizes.grow(by, best, &task.fixed);
         }
+        let mut next = made(sizes)?;
+        if over * next.over < 0.0 {
+            // One limit asks for less wire, another for more.
+            let Some(both) = balanced(&nearest, &made, &task.fixed)? else {
+                break;
+            };
+            sizes = both;
+            next = made(both)?;
+        }
+        over = next.over;
+        if over.abs() < nearest.over.abs() {
+            nearest = next;
+        }
         attempt += 1;
     }
+    let Attempt {
+        written, mut rated, ..
+    } = nearest;
+    if document.design.limits.array_settling_max_s.is_some() {
+        of_rated(
+            &Scene::with_tolerance(&written.design, tolerance)?,
+            &mut rated,
+        )?;
+    }
+    Ok((written, rated))
+}
+
+/// A coil as it was tried.
+struct Attempt {
+    /// [`excess`].
+    over: f64,
+    sizes: Sizes,
+    written: WrittenDesign,
+    rated: Rated,
+}
+
+/// Sizes near those of `at` that meet two limits, one of which asks for less wire and one for more: a Newton step
+/// along length and outer diameter; `None` where these are fixed or at their own limits, or more limits bind.
+///
+/// # Errors
+/// A coil that cannot be computed.
+fn balanced(
+    at: &Attempt,
+    made: &impl Fn(Sizes) -> Result<Attempt, RunError>,
+    fixed: &Fixed,
+) -> Result<Option<Sizes>, RunError> {
+    let sizes = at.sizes;
+    let binding = |(key, check): (&&'static str, &LimitCheck)| {
+        let over = check.value / check.limit - 1.0;
+        (is_of_wire(key) && over.abs() <= ROUNDING).then_some((*key, over))
+    };
+    let binding: Vec<(&str, f64)> = at.rated.limits.iter().filter_map(binding).collect();
+    let [(first, over_first), (second, over_second)] = binding[..] else {
+        return Ok(None);
+    };
+    if fixed.length_m.is_some() || fixed.outer_diameter_m.is_some() {
+        return Ok(None);
+    }
+    let along = |length: f64, outer: f64| Sizes {
+        length: sizes.length * (1.0 + length),
+        outer: sizes.outer * (1.0 + outer),
+        ..sizes
+    };
+    let over = [over_first, over_second];
+    let slopes = |moved: Sizes| -> Result<[f64; 2], RunError> {
+        let limits = made(moved)?.rated.limits;
+        let there = [first, second].map(|key| limits[key].value / limits[key].limit - 1.0);
+        Ok([0, 1].map(|row| (there[row] - over[row]) / SLOPE_STEP))
+    };
+    let [a, c] = slopes(along(SLOPE_STEP, 0.0))?;
+    let [b, d] = slopes(along(0.0, SLOPE_STEP))?;
+    // A little more than the step's own error.
+    let margin = SLOPE_STEP * over_first.abs().max(over_second.abs()) + 1e-14;
+    let [p, q] = over.map(|over| -(over + margin));
+    let determinant = a * d - b * c;
+    let moved = along((p * d - b * q) / determinant, (a * q - p * c) / determinant);
+    // Also where one slope is the other's multiple, and nothing moves both.
+    let within = moved.length <= moved.length_max && moved.outer <= moved.outer_max;
+    Ok(within.then_some(moved))
+}
+
+/// Whether a limit is one on the amount of wire; a window without given turns is full of it.
+fn is_of_wire(key: &str) -> bool {
+    by_key(key).is_some_and(|row| !row.name.is_dimension() && row.name != LimitName::WindingFill)
 }
 
 /// By how much limits on the amount of wire are exceeded, relatively; negative where the coil has

@@ -6,7 +6,7 @@ use crate::accuracy::CertificateKind;
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::{limit_row, limit_value};
-use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
+use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si, si_to};
 use crate::cli::values::FileArgument;
 use crate::coil::limits::{LimitName, MANDREL_M, WIRES_A_MANDREL};
 use crate::coil::optimum::outcome::Alternative;
@@ -97,6 +97,15 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
         ));
     }
     if !held.is_empty() {
+        if result
+            .coil
+            .as_ref()
+            .is_some_and(|coil| coil.whole.is_some())
+        {
+            held.push(
+                "of a coil whose turns need not be whole: whole ones take it in steps".to_owned(),
+            );
+        }
         sheet.line("worth", &held.join("\n"));
     }
     if let Some(bore_m) = result.bobbin_bore_m {
@@ -127,7 +136,9 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
             .wires
             .iter()
             .map(|wire| {
-                let best = wire.force_n.map_or_else(|| "no coil".to_owned(), force);
+                // Of wires that were not chosen no more than three digits are computed.
+                let best = wire.force_n.map(|force_n| si_to(force_n, "N", 3));
+                let best = best.unwrap_or_else(|| "no coil".to_owned());
                 format!("{}: {best}", mm(wire.wire_diameter_m))
             })
             .collect();

@@ -12,6 +12,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEM
 use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
+use crate::coil::circuit::farthest_from_zero;
 use crate::coil::drive::Drive;
 use crate::force_direction::ForceDirection;
 
@@ -158,7 +159,7 @@ pub struct CurrentSummary {
     pub max_a: Vec<f64>,
     /// Root mean square over time in every coil, A.
     pub rms_a: Vec<f64>,
-    /// Largest sum over the coils, A.
+    /// Sum over the coils where it is farthest from zero, with its sign, A.
     pub max_sum_a: f64,
 }
 
@@ -217,7 +218,7 @@ pub(super) struct CurrentSums {
     resistance_ohm: Vec<f64>,
     max_a: Vec<f64>,
     square_a2s: Vec<f64>,
-    max_sum_a: Option<f64>,
+    max_sum_a: f64,
     heat_ws: f64,
     max_w: f64,
     time_s: f64,
@@ -230,7 +231,7 @@ impl CurrentSums {
             resistance_ohm: resistance_ohm.to_vec(),
             max_a: none.clone(),
             square_a2s: none,
-            max_sum_a: None,
+            max_sum_a: 0.0,
             heat_ws: 0.0,
             max_w: 0.0,
             time_s: 0.0,
@@ -247,7 +248,7 @@ impl CurrentSums {
             sum_a += current;
             heat_w += self.resistance_ohm[coil] * square;
         }
-        self.max_sum_a = Some(self.max_sum_a.map_or(sum_a, |most| most.max(sum_a)));
+        self.max_sum_a = farthest_from_zero([self.max_sum_a, sum_a]);
         self.heat_ws += counts_s * heat_w;
         self.max_w = self.max_w.max(heat_w);
         self.time_s += counts_s;
@@ -258,7 +259,7 @@ impl CurrentSums {
         CurrentSummary {
             max_a: self.max_a.clone(),
             rms_a: squares.map(|sum| (sum / self.time_s).sqrt()).collect(),
-            max_sum_a: self.max_sum_a.unwrap_or(0.0),
+            max_sum_a: self.max_sum_a,
         }
     }
 }
@@ -545,5 +546,21 @@ fn errors(
                 z_m,
             }
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest signed sum of drivers that only reverse was 0 A.
+    #[test]
+    fn sums_below_zero_count_by_their_size() {
+        let mut sums = CurrentSums::new(&[1.0, 2.0]);
+        for currents_a in [[0.0, 0.0], [-2.0, -1.5], [0.5, -1.0]] {
+            sums.add(&currents_a, 0.1);
+        }
+        let summary = sums.summary();
+        assert_eq!((summary.max_sum_a, summary.max_a), (-3.5, vec![2.0, 1.5]));
     }
 }

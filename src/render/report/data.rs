@@ -49,11 +49,15 @@ impl CalibratedObject<'_> {
     pub fn coils(&self) -> Vec<DrivenCoil> {
         let limits = &self.manifest.limits;
         let axes = self.manifest.array.positions_m.iter().enumerate();
-        axes.map(|(coil, &axis_m)| DrivenCoil {
-            axis_m,
-            current_a: self.lambda.currents_a.as_ref().map_or(0.0, |all| all[coil]),
-            min_a: limits.current_min_a[coil],
-            max_a: limits.current_max_a[coil],
+        axes.map(|(coil, &axis_m)| {
+            let current_a = self.lambda.currents_a.as_ref().map_or(0.0, |all| all[coil]);
+            DrivenCoil {
+                axis_m,
+                current_a,
+                min_a: limits.current_min_a[coil],
+                max_a: limits.current_max_a[coil],
+                at_limit: limits.is_reached(coil, current_a),
+            }
         })
         .collect()
     }
@@ -146,14 +150,8 @@ pub struct DrivenCoil {
     pub min_a: f64,
     /// A.
     pub max_a: f64,
-}
-
-impl DrivenCoil {
     /// Whether it carries all it may, either way.
-    #[must_use]
-    pub fn at_limit(&self) -> bool {
-        self.current_a >= self.max_a || (self.current_a <= self.min_a && self.min_a < 0.0)
-    }
+    pub at_limit: bool,
 }
 
 /// Error against run time, from a table that is shipped.

@@ -58,7 +58,7 @@ fn coils(object: &CalibratedObject) -> String {
     }
     let coils = object.coils();
     let bound: Vec<String> = (0..coils.len())
-        .filter(|coil| coils[*coil].at_limit())
+        .filter(|coil| coils[*coil].at_limit)
         .map(|coil| coil.to_string())
         .collect();
     let of = count(coils.len(), "coil");
@@ -221,7 +221,7 @@ fn currents(coils: &[DrivenCoil]) -> Table {
             place(coil.current_a.min(0.0)),
             place(coil.current_a.max(0.0)),
         );
-        let class = if coil.at_limit() { "full" } else { "some" };
+        let class = if coil.at_limit { "full" } else { "some" };
         let bar = format!(
             "<svg class=\"bar\" aria-hidden=\"true\"><rect class=\"range\" x=\"{:.2}%\" \
              width=\"{:.2}%\" y=\"15%\" height=\"70%\"/><rect class=\"{class}\" x=\"{from:.2}%\" \
@@ -236,7 +236,7 @@ fn currents(coils: &[DrivenCoil]) -> Table {
             Cell::Markup(bar),
             format!(
                 "{}{}",
-                if coil.at_limit() { "\u{25b2} " } else { "" },
+                if coil.at_limit { "\u{25b2} " } else { "" },
                 figures(coil.current_a, 4)
             )
             .into(),
