@@ -211,3 +211,23 @@ fn heat_and_settling_that_bind_together_are_both_met() {
         }
     }
 }
+
+/// What a limit is worth was stated of a coil of any turns, even of another wire, as if it were of the coil that is wound.
+#[test]
+fn the_worth_of_limits_to_whole_turns_names_the_wire_that_it_is_of() {
+    let place = Place::new();
+    place.write(
+        "wires.toml",
+        "name = \"wires\"\n[wire]\ndiameter_mm = 0.7\nchoices_mm = [0.5, 0.7, 0.8]\n\
+         [supply]\ncurrent_max_a = 9\nvoltage_v = 3\n\
+         [limits]\nouter_diameter_max_mm = 8.8\nlength_max_mm = 10.0\npower_max_w = 2.34\n",
+    );
+    let text = place
+        .run(&["optimize", "wires.toml", "--wound"])
+        .ends(0)
+        .out;
+    assert!(text.contains("turns in all of 0.7 mm wire"), "{text}");
+    let worth =
+        "of a coil whose turns need not be whole, of 0.8 mm wire: whole ones take it in steps";
+    assert!(text.contains(worth), "{text}");
+}

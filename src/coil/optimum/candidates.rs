@@ -37,7 +37,7 @@ pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
 }
 
 /// The best coil of `listed` and what is `certificate`d of it, its limits as dear as they are to
-/// the coil whose turns need not be whole, if that is of the same wire; `None` where no coil is listed.
+/// the coil whose turns need not be whole; `None` where no coil is listed.
 pub(super) fn found(
     listed: Listed,
     problems: &[Solved<'_>],
@@ -45,9 +45,8 @@ pub(super) fn found(
 ) -> Option<Outcome> {
     let (mut best, others) = (listed.best?, listed.others);
     let outcome = none(OptimumStatus::Optimal, problems);
-    let continuous = outcome.continuous.as_ref();
-    let continuous = continuous.filter(|coil| coil.strand == best.strand);
     for used in &mut best.limits {
+        let continuous = outcome.continuous.as_ref();
         used.sensitivity_n_per_unit = continuous
             .and_then(|coil| coil.limit(used.name))
             .map_or(0.0, |other| other.sensitivity_n_per_unit);

@@ -156,6 +156,8 @@ pub fn optimize(
         valley: outcome.valley,
         wires: outcome.wires,
         continuous_force_n: outcome.continuous_force_n,
+        continuous_wire_diameter_m: (outcome.continuous.as_ref())
+            .map(|coil| coil.strand.diameter_m),
         bobbin_bore_m: bobbin_bore_m(&task, outcome.best.as_ref(), &outcome.alternatives),
         alternatives: Vec::new(),
         given: None,

@@ -65,6 +65,9 @@ pub struct Optimization {
     /// With whole turns: best force of a coil whose turns need not be whole, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub continuous_force_n: Option<f64>,
+    /// With whole turns: wire of that coil, over the insulation, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub continuous_wire_diameter_m: Option<f64>,
     /// Least bore of a bobbin for the best coil's wire, m, where the design names no least bore and
     /// coils are to be wound.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -97,15 +97,7 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
         ));
     }
     if !held.is_empty() {
-        if result
-            .coil
-            .as_ref()
-            .is_some_and(|coil| coil.whole.is_some())
-        {
-            held.push(
-                "of a coil whose turns need not be whole: whole ones take it in steps".to_owned(),
-            );
-        }
+        held.extend(before_whole(result));
         sheet.line("worth", &held.join("\n"));
     }
     if let Some(bore_m) = result.bobbin_bore_m {
@@ -276,6 +268,18 @@ fn misses(given: &GivenCoil) -> Option<String> {
 }
 
 /// `1 ohm more gives 12 mN`.
+/// Whose limits are worth what is stated, where turns are whole: the best coil's without that, perhaps of another wire.
+fn before_whole(result: &Optimization) -> Option<String> {
+    let (before_m, coil) = (result.continuous_wire_diameter_m?, result.coil.as_ref()?);
+    let wire = match before_m == coil.wire_diameter_m {
+        true => String::new(),
+        false => format!(", of {} wire", mm(before_m)),
+    };
+    Some(format!(
+        "of a coil whose turns need not be whole{wire}: whole ones take it in steps"
+    ))
+}
+
 fn sensitivity(used: &LimitUse) -> String {
     let row = used.name.limit();
     let (unit, per_si) = row.step;
