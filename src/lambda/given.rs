@@ -10,7 +10,7 @@ use super::problem::{ForceProblem, ProblemError};
 /// they say nothing.
 const LEAST_REQUEST: f64 = 0.05;
 
-/// The upward force with the static currents over the requested one, `lambda h`.
+/// The upward force over the requested one: `lambda h`, times the upward part of the direction where the request leans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GivenForce {
     /// Of the means over the points.

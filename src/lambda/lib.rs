@@ -84,5 +84,7 @@ pub use given::{GivenForce, lowest_requested_m};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, constant, relative_error, solve};
-pub use vector_allocation::{MET as VECTOR_MET, VectorAllocation, VectorAllocator};
+pub use vector_allocation::{
+    MET as VECTOR_MET, SIDEWAYS_WEIGHT, VectorAllocation, VectorAllocator,
+};
 pub use wiring::{Rewired, Wiring, WiringError};

@@ -27,6 +27,9 @@
 
 use super::allocation::{Allocator, AllocatorError, Reach};
 
+/// Out of reach a sideways error counts as this share of a vertical one: vertical first.
+pub const SIDEWAYS_WEIGHT: f64 = 0.1;
+
 /// `eps` relative to the sum of `|w G_i|^2 / R_i`, first and smallest, and the factor between.
 const EPS_FIRST: f64 = 1e-7;
 const EPS_LEAST: f64 = 1e-14;

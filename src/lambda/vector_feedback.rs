@@ -24,8 +24,7 @@ use super::certificate::best_within_limits;
 use super::feedback::{FeedbackError, Reachable};
 use super::problem::{ForceProblem, Settings};
 use super::sampling::{QUARTERS, Squares};
-use super::sideways::SIDEWAYS_WEIGHT;
-use super::vector_allocation::{EvenAxes, VectorAllocator};
+use super::vector_allocation::{EvenAxes, SIDEWAYS_WEIGHT, VectorAllocator};
 
 /// Points handled together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 1024;
@@ -371,7 +370,7 @@ pub(crate) fn quarter_errors(
 }
 
 /// The sums of some points.
-fn sums_at(
+pub(super) fn sums_at(
     problem: &VectorProblem,
     points: &[usize],
     lambda_n_per_m: f64,
@@ -448,11 +447,11 @@ impl GivenCurrents<'_> {
 
 /// Sums over points.
 #[derive(Default)]
-struct Sums {
+pub(super) struct Sums {
     /// The largest weight of all points, over which theirs are taken.
     heaviest: f64,
     weight: f64,
-    requested: f64,
+    pub(super) requested: f64,
     upward: f64,
     sideways: f64,
     worst: f64,
@@ -506,7 +505,7 @@ impl Sums {
         self.angles_deg.extend(next.angles_deg);
     }
 
-    fn rendering(mut self) -> VectorRendering {
+    pub(super) fn rendering(mut self) -> VectorRendering {
         self.angles_deg.sort_by(f64::total_cmp);
         let angle_deg = |part: f64| match &self.angles_deg[..] {
             [] => 0.0,

@@ -5,6 +5,7 @@ use fluxform::commands::lambda::{LambdaOptions, run};
 use fluxform::commands::probe::{ProbeRequest, probe};
 use fluxform::design::{Design, Need};
 use fluxform::field::components::Components;
+use fluxform::force_direction::ForceDirection;
 use fluxform::numerics::spread::spread;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
@@ -15,13 +16,27 @@ use super::{here, seed_air};
 
 #[test]
 fn the_sideways_force_is_that_of_probed_gradients() {
+    let (document, _) = ShapeDocument::read(&here("shapes/wedge.toml")).expect("valid");
+    hold_against_probe(&document);
+}
+
+/// Its sideways and upward force were held against an upright request that nobody made.
+#[test]
+fn the_force_on_a_dome_is_held_against_its_normals() {
+    let text = "name = 'dome'\nprimitive = 'half-sphere'\nradius_mm = 30.0\nbase_mm = 25.0\nforce = 'normal'\n\
+                [points]\nx_mm = [-20.0, 20.0, 21]\ny_mm = [-20.0, 20.0, 21]\n";
+    let (document, _) = ShapeDocument::from_toml(text, &here("dome.toml")).expect("valid");
+    hold_against_probe(&document);
+}
+
+/// Holds the forces at the points of `document` against those of `probe`.
+fn hold_against_probe(document: &ShapeDocument) {
     // Tilted, so that every component of the gradient counts.
     let text = seed_air().replace("[magnet]", "[magnet]\ntilt_deg = [11.0, -7.0]");
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::from_toml(&text, &path, Need::LAMBDA).expect("valid");
-    let (document, _) = ShapeDocument::read(&here("shapes/wedge.toml")).expect("valid");
     let options = LambdaOptions::default();
-    let (points, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let (points, report) = run(&design, document, Vec::new(), &options, &Silent).expect("solves");
     let points = &points.discretized.points;
     let rows = || spread(points.height_m.len(), 4000).into_iter();
     let places = rows().map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
@@ -34,7 +49,8 @@ fn the_sideways_force_is_that_of_probed_gradients() {
     assert!(moment[0].abs() > 0.05 * moment[2].abs());
     let currents = report.file.currents_a.as_ref().expect("currents");
     let lambda = report.file.lambda_n_per_m.expect("a force constant");
-    let (mut sideways, mut requested, mut angles) = (0.0, 0.0, Vec::new());
+    let (mut off, mut requested, mut angles) = (0.0, 0.0, Vec::new());
+    let mut upward = [0.0; 2];
     for (place, row) in rows().enumerate() {
         let mut force = [0.0; 3];
         for (coil, current) in currents.iter().enumerate() {
@@ -45,24 +61,29 @@ fn the_sideways_force_is_that_of_probed_gradients() {
                 *sum += current * along;
             }
         }
-        let side = force[0].hypot(force[1]);
-        sideways += side * side;
-        requested += (lambda * points.height_m[row]).powi(2);
-        angles.push(side.atan2(force[2]).to_degrees());
+        let direction = match document.force.direction {
+            ForceDirection::Normal => points.normal[row],
+            ForceDirection::Vertical | ForceDirection::VerticalOnly => [0.0, 0.0, 1.0],
+        };
+        let wanted = direction.map(|part| lambda * points.height_m[row] * part);
+        off += (force[0] - wanted[0]).powi(2) + (force[1] - wanted[1]).powi(2);
+        requested += wanted.iter().map(|part| part * part).sum::<f64>();
+        let length = |v: [f64; 3]| v.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let along: f64 = (0..3).map(|k| force[k] * wanted[k]).sum();
+        angles.push((along / length(force) / length(wanted)).acos().to_degrees());
+        upward[0] += force[2];
+        upward[1] += wanted[2];
     }
     angles.sort_by(f64::total_cmp);
     let found = report.file.sideways.expect("reported");
     assert_eq!(found.points, angles.len());
-    let share = (sideways / requested).sqrt();
-    assert!(
-        (found.static_share / share - 1.0).abs() < 1e-9,
-        "{found:?} {share}"
-    );
-    let median = angles[angles.len() / 2];
-    assert!(
-        (found.static_median_deg - median).abs() < 1e-6,
-        "{found:?} {median}"
-    );
+    let near = |found: f64, probed: f64| {
+        assert!((found - probed).abs() < 1e-6 * probed, "{found} {probed}");
+    };
+    near(found.static_share, (off / requested).sqrt());
+    near(found.static_median_deg, angles[angles.len() / 2]);
+    let given = report.file.given_force.expect("reported").mean;
+    near(given, upward[0] / upward[1]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use fluxform_lambda::ForceProblem;
 use fluxform_lambda::sideways::sideways;
+use fluxform_lambda::vector_feedback::VectorProblem;
 
 /// Two coils of 1 and 4 ohm, the second of which alone pushes along x too, under two points.
 #[test]
@@ -18,7 +19,12 @@ fn shares_angles_and_power_are_those_by_hand() {
         resistance_ohm: &[1.0, 4.0],
     };
     let fixed = [0.25, 0.5];
-    let found = sideways(&problem, [&along_x, &along_y], 0.8, &fixed, &[0, 1]);
+    let vectors = VectorProblem {
+        upward: problem,
+        sides_n_per_a: [&along_x, &along_y],
+        direction: &[[0.0, 0.0, 1.0]; 2],
+    };
+    let found = sideways(&vectors, 0.8, &fixed, &[0, 1]);
     let found = found.unwrap().unwrap();
     let near = |found: f64, by_hand: f64| {
         assert!((found - by_hand).abs() < 1e-9, "{found}, not {by_hand}");
@@ -53,4 +59,35 @@ fn shares_angles_and_power_are_those_by_hand() {
     );
     near(found.feedback_reached, 1.0);
     near(found.vector_reached, 1.0);
+}
+
+/// A request along a normal was held against upward: sideways 0.5 of a push that leans by as much.
+#[test]
+fn a_leaning_request_is_held_against_itself() {
+    let problem = ForceProblem {
+        forces_n_per_a: &[0.8],
+        height_m: &[1.0],
+        offset_n: None,
+        weights: None,
+        lower_a: &[-9.0],
+        upper_a: &[9.0],
+        total_max_a: None,
+        resistance_ohm: &[1.0],
+    };
+    let vectors = VectorProblem {
+        upward: problem,
+        sides_n_per_a: [&[0.6], &[0.0]],
+        direction: &[[0.6, 0.0, 0.8]],
+    };
+    let found = sideways(&vectors, 1.0, &[1.0], &[0]).unwrap().unwrap();
+    assert!(found.static_share < 1e-12 && found.static_median_deg < 1e-6);
+    assert!(found.feedback_share < 1e-12);
+    // Of the same upward force, sideways the other way: twice 0.6 off.
+    let opposed = VectorProblem {
+        sides_n_per_a: [&[-0.6], &[0.0]],
+        ..vectors
+    };
+    let found = sideways(&opposed, 1.0, &[1.0], &[0]).unwrap().unwrap();
+    assert!((found.static_share - 1.2).abs() < 1e-12);
+    assert!((found.static_median_deg - 2.0 * 0.6_f64.asin().to_degrees()).abs() < 1e-9);
 }

@@ -6,7 +6,7 @@ use fluxform_lambda::ForceProblem;
 use fluxform_lambda::all_points::AllPoints;
 use fluxform_lambda::sampling::quarters;
 use fluxform_lambda::uncertainty::{
-    Drawn, Study, Surroundings, Turned, displacements_m, draws, robust_currents, study,
+    Drawn, Study, Surroundings, TradeOff, Turned, displacements_m, draws, robust_currents, study,
 };
 use fluxform_lambda::vector_feedback::VectorProblem;
 use fluxform_numerics::random::Random;
@@ -279,6 +279,10 @@ fn the_sum_of_robust_currents_holds_where_coils_push_against_each_other() {
 
 /// A bent surface under the given uncertainties.
 fn of_surface(given: &Uncertainty, vector: bool, cap_w: Option<f64>) -> Study {
+    of_places(&surface(), given, vector, cap_w)
+}
+
+fn surface() -> Vec<[f64; 3]> {
     let mut positions = Vec::new();
     for i in 0..8 {
         for j in 0..7 {
@@ -286,7 +290,7 @@ fn of_surface(given: &Uncertainty, vector: bool, cap_w: Option<f64>) -> Study {
             positions.push([x, y, 0.034 - 6.0 * (x * x + 0.7 * y * y)]);
         }
     }
-    of_places(&positions, given, vector, cap_w)
+    positions
 }
 
 fn of_places(
@@ -486,6 +490,45 @@ fn more_power_never_errs_more_and_a_cap_holds() {
             "{power} of {}",
             share * most
         );
+    }
+}
+
+/// The currents that were chosen lost to others of the same curve: those were ordered by the errors at some points, and
+/// the error that is the least was taken to be the last.
+#[test]
+fn nothing_on_the_curve_beats_what_is_chosen() {
+    let all = surface();
+    let some: Vec<[f64; 3]> = all.iter().copied().step_by(6).collect();
+    for aim in [false, true] {
+        let of = |cap_w| of_some(&all, &some, &ALL, (aim, cap_w));
+        let error = |of: &TradeOff| if aim { of.expected } else { of.vertical };
+        let free = of(None);
+        let most = free.robust_static.trade_off.last().expect("a curve");
+        for cap_w in [
+            None,
+            Some(0.3 * most.mean_power_w),
+            Some(2.0 * most.mean_power_w),
+        ] {
+            let found = of(cap_w);
+            let setting = &found.robust_static;
+            let chosen = &setting.error.promised;
+            let own = if aim {
+                chosen.expected
+            } else {
+                chosen.vertical
+            };
+            let curve = || setting.trade_off.iter();
+            let least = curve().map(error).fold(f64::INFINITY, f64::min);
+            for other in curve() {
+                let (less, cheaper) =
+                    (error(other) < own, other.mean_power_w < chosen.mean_power_w);
+                let better = match cap_w {
+                    Some(cap_w) => less && other.mean_power_w <= cap_w,
+                    None => cheaper && error(other) <= 1.05 * least,
+                };
+                assert!(!better, "{aim} {cap_w:?}: {other:?} against {chosen:?}");
+            }
+        }
     }
 }
 

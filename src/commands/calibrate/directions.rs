@@ -3,8 +3,7 @@
 use super::Calibration;
 use crate::RunError;
 use crate::commands::lambda::LambdaReport;
-use crate::lambda::sideways::SIDEWAYS_WEIGHT;
-use crate::lambda::{Allocator, VectorAllocator};
+use crate::lambda::{Allocator, SIDEWAYS_WEIGHT, VectorAllocator};
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::report::data::{DirectionCell, DirectionField};

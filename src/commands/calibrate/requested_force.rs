@@ -3,7 +3,7 @@
 use crate::bundle::manifest::ForceSummary;
 use crate::bundle::rendering::Requested;
 use crate::force_direction::RequestedForce;
-use crate::lambda::sideways::SIDEWAYS_WEIGHT;
+use crate::lambda::SIDEWAYS_WEIGHT;
 use crate::shape::points::ConstraintPoints;
 
 /// The request as a bundle states it; `None` where the upward component alone is requested.

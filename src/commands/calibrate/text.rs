@@ -148,7 +148,7 @@ fn force_lines(sheet: &mut Sheet, report: &CalibrateReport) {
     sheet.line(
         "force",
         "off by, sideways: of the vector, relative to the requested force; upward: mean given of it\n\
-         rms, relative, worst: errors of the upward force with one set of currents for all points",
+         rms, relative, worst: upward force against lambda h, one set of currents for all points",
     );
     let above = of_shapes(report, |file| {
         let fixed = file.headline.as_ref()?.static_currents.as_ref()?;

@@ -20,9 +20,9 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::rendering::HeightGrid;
 use crate::design::Design;
 use crate::force_direction::RequestedForce;
-use crate::lambda::sideways::SIDEWAYS_WEIGHT;
 use crate::lambda::{
-    self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status, VectorAllocator,
+    self, Allocator, Criterion, ForceProblem, Reach, SIDEWAYS_WEIGHT, Settings, Solution, Status,
+    VectorAllocator,
 };
 use crate::plot::slices::Slice;
 use crate::progress::Progress;

@@ -7,10 +7,10 @@ use crate::RunError;
 use crate::bundle::headline::FeltForce;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::force_direction::RequestedForce;
-use crate::lambda::ForceProblem;
 use crate::lambda::all_points::AllPoints;
 use crate::lambda::sideways::{Sideways, sideways};
 use crate::lambda::vector_feedback::VectorProblem;
+use crate::lambda::{ForceProblem, GivenForce};
 use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -83,15 +83,29 @@ pub(crate) fn add(
     };
     let quarters = chosen.quarters(points);
     let some = spread(positions_m.len(), MOST_FOLLOWED);
-    let sideways = sideways(&of_z, sides, lambda, currents_a, &some).map_err(render_error)?;
+    let sideways = sideways(&vectors, lambda, currents_a, &some).map_err(render_error)?;
     let vector = force.direction.is_vector();
     let all = AllPoints::new(vectors, &quarters, (lambda, currents_a), vector);
     let all = all.map_err(render_error)?;
+    let upward_part = (force.along_normal())
+        .map(|_| given_upward(&given, &of_z, &direction, lambda, currents_a))
+        .transpose()?;
     let study = study_of(&all, (scene, solved), points, (options, force), progress)?;
     let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
     let felt = FeltForce::new(&all, study.as_ref(), pull_share);
     if let Some(headline) = &mut file.headline {
         headline.add_felt(felt);
+    }
+    if let Some([fixed, feedback]) = upward_part {
+        let above_saturation = file.given_force.is_some_and(|of| of.above_saturation);
+        file.given_force = fixed.map(|of| GivenForce {
+            above_saturation,
+            ..of
+        });
+        if let Some(headline) = &mut file.headline {
+            headline.static_currents = file.given_force;
+            headline.feedback = feedback;
+        }
     }
     file.uncertainty = study;
     file.sideways = sideways.map(|found| Sideways {
@@ -99,6 +113,29 @@ pub(crate) fn add(
         ..found
     });
     Ok(())
+}
+
+/// What static currents and feedback give of the upward part of requests that lean.
+///
+/// # Errors
+/// Where the problem is malformed.
+fn given_upward(
+    given: &ForceProblem,
+    with_feedback: &ForceProblem,
+    direction: &[[f64; 3]],
+    lambda_n_per_m: f64,
+    currents_a: &[f64],
+) -> Result<[Option<GivenForce>; 2], RunError> {
+    let heights = given.height_m.iter().zip(direction);
+    let upward_m: Vec<f64> = heights.map(|(height_m, [_, _, z])| height_m * z).collect();
+    let [fixed, followed] = [given, with_feedback].map(|problem| ForceProblem {
+        height_m: &upward_m,
+        ..*problem
+    });
+    Ok([
+        GivenForce::of(&fixed, lambda_n_per_m, currents_a, None),
+        GivenForce::with_feedback(&followed, lambda_n_per_m)?,
+    ])
 }
 
 /// The steel's sideways pull, root mean square over that of the requested force, to about a tenth of itself: of some

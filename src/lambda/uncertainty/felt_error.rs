@@ -49,7 +49,20 @@ pub struct TradeOff {
     pub sideways: f64,
 }
 
-/// Currents chosen for the uncertainties.
+impl TradeOff {
+    pub(super) fn at((price_n2_per_w, error): &(f64, FeltError)) -> Self {
+        Self {
+            price_n2_per_w: *price_n2_per_w,
+            mean_power_w: error.mean_power_w,
+            expected: error.expected,
+            vertical: error.vertical,
+            sideways: error.sideways,
+        }
+    }
+}
+
+/// Currents chosen for the uncertainties: of the least expected error for the power they may take, the upward one where
+/// that alone is requested.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobustSetting {
     /// The chosen price of power, N^2/W: with it a runtime finds the currents at any place.

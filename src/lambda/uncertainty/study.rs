@@ -16,8 +16,7 @@ use crate::allocation::Allocator;
 use crate::feedback::FeedbackError;
 use crate::problem::{ForceProblem, Settings};
 use crate::sampling::{QUARTERS, Squares, over_all_points, share, share_and_error};
-use crate::sideways::SIDEWAYS_WEIGHT;
-use crate::vector_allocation::VectorAllocator;
+use crate::vector_allocation::{SIDEWAYS_WEIGHT, VectorAllocator};
 use crate::vector_feedback::QuarterErrors;
 
 /// Prices of the curve, from the highest down by this factor.
@@ -26,7 +25,7 @@ const PRICE_FACTOR: f64 = 0.562_341_325_190_349; // 10^(-1/4)
 /// Without a cap the least power whose error is at most this many times the least.
 const NEAR_LEAST: f64 = 1.05;
 /// Halvings of the price between too high and too low.
-const HALVINGS: usize = 40;
+const HALVINGS: usize = 20;
 /// Prices are not raised beyond this many times the highest of the curve.
 const DEAREST: f64 = 1e12;
 /// Directions in which the finger tilts for the largest error.
@@ -456,7 +455,7 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    fn at(&self, price: f64) -> (Currents, FeltError) {
+    fn currents(&self, price: f64) -> Currents {
         let problem = &self.bench.around.problem;
         let one = |form: &ErrorForm| {
             let mut currents = vec![0.0; problem.coils()];
@@ -469,66 +468,59 @@ impl<'a> Chooser<'a> {
         } else {
             OwnCurrents::PerPoint(own)
         };
-        let currents = Currents { own, of_all: None };
-        let error = self.bench.expected(self.forms, &currents);
-        (currents, error)
+        Currents { own, of_all: None }
     }
 
-    /// The setting, and the curve; `top` is the highest price. Chosen by the errors at the points looked at, which the
-    /// currents make least; those that are stated are over all points.
+    /// # Errors
+    /// Where the problem is malformed.
+    fn at(&self, price: f64) -> Result<(Currents, FeltError), FeedbackError> {
+        let currents = self.currents(price).over(self.bench.all)?;
+        let error = self.bench.expected(self.forms, &currents);
+        Ok((currents, error))
+    }
+
+    /// The setting, and the curve; `top` is its highest price.
     fn choose(
         &self,
         top: f64,
         cap_w: Option<f64>,
     ) -> Result<(f64, Currents, Vec<TradeOff>), FeedbackError> {
-        let of_price = |k| {
-            let price = top * PRICE_FACTOR.powi(k);
-            (price, self.at(price))
+        let at = |price: f64| Ok::<_, FeedbackError>((price, self.at(price)?.1));
+        let curve = (0..PRICES).map(|k| at(top * PRICE_FACTOR.powi(k)));
+        let mut tried = curve.collect::<Result<Vec<_>, _>>()?;
+        let trade_off = tried.iter().map(TradeOff::at).collect();
+        let aim = |(_, error): &(f64, FeltError)| self.bench.aim(error);
+        let power_w = |(_, error): &(f64, FeltError)| error.mean_power_w;
+        let least = tried.iter().map(aim).fold(f64::INFINITY, f64::min);
+        let allowed = |one: &(f64, FeltError)| match cap_w {
+            Some(cap) => power_w(one) <= cap,
+            None => aim(one) <= NEAR_LEAST * least,
         };
-        let curve: Vec<(f64, (Currents, FeltError))> = (0..PRICES).map(of_price).collect();
-        let last = curve.last();
-        let least = last.map_or(0.0, |(_, (_, error))| self.bench.aim(error));
-        // Above the price at which this ends, power is too dear: too little error is bought, or the cap holds.
-        let dear = |error: &FeltError| match cap_w {
-            Some(cap) => error.mean_power_w <= cap,
-            None => self.bench.aim(error) > NEAR_LEAST * least,
-        };
-        let mut high = top;
-        if cap_w.is_some() {
-            while high < DEAREST * top && !dear(&self.at(high).1) {
-                high *= 2.0;
+        // Above some price power is too dear: the cap holds, or too little error is bought.
+        let dear = |one: &(f64, FeltError)| allowed(one) == cap_w.is_some();
+        while cap_w.is_some() && !dear(&tried[0]) && tried[0].0 < DEAREST * top {
+            tried.insert(0, at(2.0 * tried[0].0)?);
+        }
+        let cheap = tried.iter().position(|one| !dear(one)).unwrap_or(0);
+        if cheap > 0 {
+            let [mut high, mut low] = [tried[cheap - 1].0, tried[cheap].0];
+            for _ in 0..HALVINGS {
+                let middle = at((high * low).sqrt())?;
+                *if dear(&middle) { &mut high } else { &mut low } = middle.0;
+                tried.push(middle);
             }
         }
-        let cheap = curve.iter().find(|(_, (_, error))| !dear(error));
-        // Without a crossing the cheapest of the curve does.
-        let mut low = cheap.or(curve.last()).map_or(top, |(price, _)| *price);
-        for _ in 0..if cheap.is_some() { HALVINGS } else { 0 } {
-            let middle = (high * low).sqrt();
-            if dear(&self.at(middle).1) {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        let price = if cap_w.is_some() && cheap.is_some() {
-            high
-        } else {
-            low
+        // Of all that were tried: errors at all points need not fall with the price as those at the points looked at do.
+        let order = |one: &(f64, FeltError)| match cap_w {
+            Some(_) => [aim(one), power_w(one)],
+            None => [power_w(one), aim(one)],
         };
-        let point = |(price_n2_per_w, (currents, _)): (f64, (Currents, FeltError))| {
-            let currents = currents.over(self.bench.all)?;
-            let error = self.bench.expected(self.forms, &currents);
-            Ok::<_, FeedbackError>(TradeOff {
-                price_n2_per_w,
-                mean_power_w: error.mean_power_w,
-                expected: error.expected,
-                vertical: error.vertical,
-                sideways: error.sideways,
-            })
-        };
-        let currents = self.at(price).0.over(self.bench.all)?;
-        let curve = curve.into_iter().map(point);
-        Ok((price, currents, curve.collect::<Result<_, _>>()?))
+        let by = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+        let among = tried.iter().filter(|one| allowed(one));
+        let best = among
+            .min_by(|a, b| by(&order(a), &order(b)))
+            .unwrap_or(&tried[0]);
+        Ok((best.0, self.at(best.0)?.0, trade_off))
     }
 }
 
@@ -641,9 +633,7 @@ impl Costs<'_> {
             };
             let [with, _] = self.shares(&around.forms(lambda, &only, reach), self.robust);
             let forms = around.forms(lambda, &halved, half);
-            let again = Chooser::new(self.bench, &forms, false)
-                .at(self.price_n2_per_w)
-                .0;
+            let again = Chooser::new(self.bench, &forms, false).currents(self.price_n2_per_w);
             let [_, less] = self.shares(&forms, &again);
             let added = |with: f64, without: f64| (with * with - without * without).max(0.0).sqrt();
             CauseCost {
