@@ -261,7 +261,7 @@ pub fn render(problem: &ForceProblem, lambda_n_per_m: f64) -> Result<Rendered, F
             let first = chunk * CHUNK_POINTS;
             for point in first..first + heights.len() {
                 fluxform_base::progress::poll();
-                let weight = problem.weights.map_or(1.0, |all| all[point] / heaviest);
+                let weight = problem.weight(point) / heaviest;
                 sums.add(problem, &mut allocator, point, weight, lambda_n_per_m);
             }
             sums

@@ -24,36 +24,55 @@ pub struct GivenForce {
 }
 
 /// Sums of forces and their ratios over the points.
-struct Ratios {
-    highest_m: f64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ratios {
+    /// Ratios to requests that are no larger do not count, N.
+    pub(super) least_request_n: f64,
     given: f64,
     requested: f64,
     least: f64,
     most: f64,
 }
 
-impl Ratios {
-    fn new(problem: &ForceProblem) -> Self {
+impl Default for Ratios {
+    fn default() -> Self {
         Self {
-            highest_m: problem.height_m.iter().copied().fold(0.0, f64::max),
+            least_request_n: 0.0,
             given: 0.0,
             requested: 0.0,
             least: f64::INFINITY,
             most: f64::NEG_INFINITY,
         }
     }
+}
 
-    fn add(&mut self, problem: &ForceProblem, point: usize, force_n: f64, request_n: f64) {
-        let weight = problem.weights.map_or(1.0, |all| all[point]);
+impl Ratios {
+    /// Of points at which at most `highest_n` is requested.
+    pub(super) fn new(highest_n: f64) -> Self {
+        Self {
+            least_request_n: LEAST_REQUEST * highest_n,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn add(&mut self, weight: f64, force_n: f64, request_n: f64) {
         self.given += weight * force_n;
         self.requested += weight * request_n;
-        if problem.height_m[point] > LEAST_REQUEST * self.highest_m {
+        if request_n > self.least_request_n {
             self.least = self.least.min(force_n / request_n);
             self.most = self.most.max(force_n / request_n);
         }
     }
 
-    fn of_force(&self, above_saturation: bool) -> Option<GivenForce> {
+    /// Points that come after these.
+    pub(super) fn join(&mut self, next: &Self) {
+        self.given += next.given;
+        self.requested += next.requested;
+        self.least = self.least.min(next.least);
+        self.most = self.most.max(next.most);
+    }
+
+    pub(super) fn of_force(&self, above_saturation: bool) -> Option<GivenForce> {
         (self.requested > 0.0 && self.least.is_finite()).then(|| GivenForce {
             mean: self.given / self.requested,
             least: self.least,
@@ -81,17 +100,13 @@ impl GivenForce {
         currents_a: &[f64],
         lambda_saturation_n_per_m: Option<f64>,
     ) -> Option<Self> {
-        let mut ratios = Ratios::new(problem);
+        let mut ratios = Self::ratios(problem, lambda_n_per_m);
         let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
         for (point, (row, height_m)) in rows.zip(problem.height_m).enumerate() {
             let offset_n = problem.offset_n.map_or(0.0, |offset| offset[point]);
             let coils_n: f64 = row.iter().zip(currents_a).map(|(f, i)| f * i).sum();
-            ratios.add(
-                problem,
-                point,
-                coils_n + offset_n,
-                lambda_n_per_m * height_m,
-            );
+            let request_n = lambda_n_per_m * height_m;
+            ratios.add(problem.weight(point), coils_n + offset_n, request_n);
         }
         let above = |saturation: f64| lambda_n_per_m > saturation * (1.0 + 1e-12);
         ratios.of_force(lambda_saturation_n_per_m.is_some_and(above))
@@ -107,13 +122,18 @@ impl GivenForce {
         lambda_n_per_m: f64,
     ) -> Result<Option<Self>, ProblemError> {
         let Reachable { least_n, most_n } = reachable(problem)?;
-        let mut ratios = Ratios::new(problem);
+        let mut ratios = Self::ratios(problem, lambda_n_per_m);
         for (point, height_m) in problem.height_m.iter().enumerate() {
             let request_n = lambda_n_per_m * height_m;
             let force_n = request_n.max(least_n[point]).min(most_n[point]);
-            ratios.add(problem, point, force_n, request_n);
+            ratios.add(problem.weight(point), force_n, request_n);
         }
         Ok(ratios.of_force(false))
+    }
+
+    fn ratios(problem: &ForceProblem, lambda_n_per_m: f64) -> Ratios {
+        let highest_m = problem.height_m.iter().copied().fold(0.0, f64::max);
+        Ratios::new(lambda_n_per_m * highest_m)
     }
 }
 

@@ -201,12 +201,20 @@ impl ForceProblem<'_> {
     /// Root mean square of the heights, m, each point with its weight.
     #[must_use]
     pub fn rms_height_m(&self) -> f64 {
-        let weight = |row: usize| self.weights.map_or(1.0, |weights| weights[row]);
         let heights = self.height_m.iter().enumerate();
         let (sum, total) = heights.fold((0.0, 0.0), |(sum, total), (row, height_m)| {
-            (sum + weight(row) * height_m * height_m, total + weight(row))
+            (
+                sum + self.weight(row) * height_m * height_m,
+                total + self.weight(row),
+            )
         });
         (sum / total).sqrt()
+    }
+
+    /// The weight of a point in the mean.
+    #[must_use]
+    pub fn weight(&self, point: usize) -> f64 {
+        self.weights.map_or(1.0, |all| all[point])
     }
 
     /// The largest weight; 1 without weights.

@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::allocation::{Allocator, Reach};
 use super::certificate::best_within_limits;
 use super::feedback::{FeedbackError, Reachable};
+use super::given::{GivenForce, Ratios};
 use super::problem::{ForceProblem, Settings};
 use super::sampling::{QUARTERS, Squares};
 use super::vector_allocation::{EvenAxes, SIDEWAYS_WEIGHT, VectorAllocator};
@@ -69,6 +70,8 @@ pub struct QuarterErrors {
     pub worst_n: f64,
     /// Mean power in the coils, W.
     pub mean_power_w: f64,
+    /// The upward force over the upward part of the request; `None` where none is requested.
+    pub given: Option<GivenForce>,
 }
 
 /// How well given currents render requested vectors; means by the points' weights.
@@ -366,6 +369,7 @@ pub(crate) fn quarter_errors(
         squares,
         worst_n: all.worst,
         mean_power_w: all.power / all.weight,
+        given: all.given.of_force(false),
     })
 }
 
@@ -379,6 +383,9 @@ pub(super) fn sums_at(
     let vector = problem.allocator(SIDEWAYS_WEIGHT)?;
     let limits = &problem.upward;
     let heaviest = limits.heaviest();
+    let heights = limits.height_m.iter().zip(problem.direction);
+    let highest_m = heights.map(|(height_m, [_, _, up])| height_m * up);
+    let given = Ratios::new(lambda_n_per_m * highest_m.fold(0.0, f64::max));
     let upward = Allocator::new(
         limits.resistance_ohm,
         limits.lower_a,
@@ -388,7 +395,7 @@ pub(super) fn sums_at(
     let parts: Vec<Sums> = points
         .par_chunks(CHUNK_POINTS)
         .map(|points| {
-            let mut given = GivenCurrents {
+            let mut chosen = GivenCurrents {
                 currents_of,
                 upward: upward.clone(),
                 vector: vector.clone(),
@@ -397,11 +404,12 @@ pub(super) fn sums_at(
             };
             let mut sums = Sums {
                 heaviest,
+                given,
                 ..Sums::default()
             };
             for &point in points {
                 fluxform_base::progress::poll();
-                sums.add(problem, &mut given, point, lambda_n_per_m);
+                sums.add(problem, &mut chosen, point, lambda_n_per_m);
             }
             sums
         })
@@ -458,6 +466,8 @@ pub(super) struct Sums {
     reached: f64,
     power: f64,
     largest: f64,
+    /// Of the upward force.
+    given: Ratios,
     angles_deg: Vec<f64>,
 }
 
@@ -465,15 +475,15 @@ impl Sums {
     fn add(
         &mut self,
         problem: &VectorProblem,
-        given: &mut GivenCurrents,
+        chosen: &mut GivenCurrents,
         point: usize,
         lambda: f64,
     ) {
         let rows = problem.point(point);
         let limits = &problem.upward;
-        let weight = (limits.weights).map_or(1.0, |all| all[point] / self.heaviest);
-        let reach = given.at(&rows, lambda);
-        let force = rows.given(&given.currents);
+        let weight = limits.weight(point) / self.heaviest;
+        let reach = chosen.at(&rows, lambda);
+        let force = rows.given(&chosen.currents);
         let request = rows.request.map(|part| lambda * part);
         let [x, y, z]: [f64; 3] = std::array::from_fn(|k| force[k] - request[k]);
         let sideways = x * x + y * y;
@@ -483,10 +493,11 @@ impl Sums {
         self.sideways += weight * sideways;
         self.worst = self.worst.max((sideways + z * z).sqrt());
         self.reached += if reach == Reach::Reached { weight } else { 0.0 };
-        for (current, ohm) in given.currents.iter().zip(limits.resistance_ohm) {
+        for (current, ohm) in chosen.currents.iter().zip(limits.resistance_ohm) {
             self.power += weight * ohm * current * current;
             self.largest = self.largest.max(current.abs());
         }
+        self.given.add(weight, force[2], request[2]);
         if request != [0.0; 3] {
             self.angles_deg.push(angle_deg(request, force));
         }
@@ -502,6 +513,7 @@ impl Sums {
         self.reached += next.reached;
         self.power += next.power;
         self.largest = self.largest.max(next.largest);
+        self.given.join(&next.given);
         self.angles_deg.extend(next.angles_deg);
     }
 

@@ -105,6 +105,16 @@ impl Wiring {
         self.broken.iter().copied().chain(second)
     }
 
+    /// The currents as the changed problem has them: that of a pair is its first coil's, whose resistance is both coils'.
+    #[must_use]
+    pub fn own(&self, currents_a: &[f64]) -> Vec<f64> {
+        let mut own = currents_a.to_vec();
+        for coil in self.silent() {
+            own[coil] = 0.0;
+        }
+        own
+    }
+
     /// Gives the second coil of every pair the current of the first.
     pub fn spread(&self, currents_a: &mut [f64]) {
         for &[a, b] in &self.series {

@@ -303,3 +303,30 @@ fn the_felt_error_of_some_points_states_what_others_may_change() {
         }
     }
 }
+
+/// The second coil of a pair in series was counted with its own resistance once more: 243 W of 219.
+#[test]
+fn a_pair_in_series_takes_the_power_of_its_two_coils() {
+    let place = Place::new();
+    let flags = ["--series", "0+8", "--sensor-error", "1mm", "--feedback"];
+    let found = solved(&place, SEED, &flags);
+    let currents = found["currents_a"].as_array().expect("currents");
+    let squares = currents
+        .iter()
+        .map(|of| of.as_f64().expect("a number").powi(2));
+    let heat = &found["hottest_coil"];
+    // Coils that are alike, the hottest of which has the largest current.
+    let ohm = number(heat, "/power_w") / number(heat, "/current_a").powi(2);
+    let power_w = ohm * squares.sum::<f64>();
+    for of in [
+        "/uncertainty/static/promised/mean_power_w",
+        "/feedback/vector/static/mean_power_w",
+        "/feedback/without/power_w",
+    ] {
+        let stated = number(&found, of);
+        assert!(
+            (stated - power_w).abs() < 1e-9 * power_w,
+            "{of}: {stated}, not {power_w}"
+        );
+    }
+}

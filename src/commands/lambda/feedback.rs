@@ -295,8 +295,9 @@ impl PosedProblem<'_> {
         let rendered = |lambda: f64, of: CurrentsOf| {
             render_vectors(&problem, lambda, of).map_err(render_error)
         };
-        let at_chosen = |of: fn(&OperatingPoint) -> CurrentsOf| {
-            let rendered = chosen.map(|chosen| rendered(chosen.lambda_n_per_m, of(chosen)));
+        let own = chosen.map(|chosen| self.options.wiring.own(&chosen.currents_a));
+        let at_chosen = |of: CurrentsOf| {
+            let rendered = chosen.map(|chosen| rendered(chosen.lambda_n_per_m, of));
             rendered.transpose()
         };
         let at_largest = largest
@@ -306,10 +307,10 @@ impl PosedProblem<'_> {
             direction: force.direction,
             normal_force: force.along_normal(),
             largest: largest_given(largest, |at| positions[at.point]),
-            fixed: at_chosen(|chosen| CurrentsOf::Static(&chosen.currents_a))?,
+            fixed: at_chosen(CurrentsOf::Static(own.as_deref().unwrap_or_default()))?,
             static_vector: Some(self.static_vector(&problem, chosen)?),
-            upward: at_chosen(|_| CurrentsOf::Upward)?,
-            vector: at_chosen(|_| CurrentsOf::Vector)?,
+            upward: at_chosen(CurrentsOf::Upward)?,
+            vector: at_chosen(CurrentsOf::Vector)?,
             at_largest: at_largest.transpose()?,
         }))
     }

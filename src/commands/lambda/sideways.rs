@@ -83,25 +83,25 @@ pub(crate) fn add(
     };
     let quarters = chosen.quarters(points);
     let some = spread(positions_m.len(), MOST_FOLLOWED);
-    let sideways = sideways(&vectors, lambda, currents_a, &some).map_err(render_error)?;
+    let own_a = options.wiring.own(currents_a);
+    let sideways = sideways(&vectors, lambda, &own_a, &some).map_err(render_error)?;
     let vector = force.direction.is_vector();
-    let all = AllPoints::new(vectors, &quarters, (lambda, currents_a), vector);
+    let all = AllPoints::new(vectors, &quarters, (lambda, &own_a), vector);
     let all = all.map_err(render_error)?;
-    let upward_part = (force.along_normal())
-        .map(|_| given_upward(&given, &of_z, &direction, lambda, currents_a))
-        .transpose()?;
     let study = study_of(&all, (scene, solved), points, (options, force), progress)?;
+    let (fixed, feedback) = (all.fixed.given, all.feedback.given);
     let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
     let felt = FeltForce::new(&all, study.as_ref(), pull_share);
     if let Some(headline) = &mut file.headline {
         headline.add_felt(felt);
     }
-    if let Some([fixed, feedback]) = upward_part {
+    if vector {
         let above_saturation = file.given_force.is_some_and(|of| of.above_saturation);
-        file.given_force = fixed.map(|of| GivenForce {
+        let marked = |of| GivenForce {
             above_saturation,
             ..of
-        });
+        };
+        file.given_force = fixed.map(marked);
         if let Some(headline) = &mut file.headline {
             headline.static_currents = file.given_force;
             headline.feedback = feedback;
@@ -115,29 +115,6 @@ pub(crate) fn add(
     Ok(())
 }
 
-/// What static currents and feedback give of the upward part of requests that lean.
-///
-/// # Errors
-/// Where the problem is malformed.
-fn given_upward(
-    given: &ForceProblem,
-    with_feedback: &ForceProblem,
-    direction: &[[f64; 3]],
-    lambda_n_per_m: f64,
-    currents_a: &[f64],
-) -> Result<[Option<GivenForce>; 2], RunError> {
-    let heights = given.height_m.iter().zip(direction);
-    let upward_m: Vec<f64> = heights.map(|(height_m, [_, _, z])| height_m * z).collect();
-    let [fixed, followed] = [given, with_feedback].map(|problem| ForceProblem {
-        height_m: &upward_m,
-        ..*problem
-    });
-    Ok([
-        GivenForce::of(&fixed, lambda_n_per_m, currents_a, None),
-        GivenForce::with_feedback(&followed, lambda_n_per_m)?,
-    ])
-}
-
 /// The steel's sideways pull, root mean square over that of the requested force, to about a tenth of itself: of some
 /// points, as the upward pull of all is to theirs.
 fn sideways_share(
@@ -146,9 +123,7 @@ fn sideways_share(
     problem: &ForceProblem,
     lambda_n_per_m: f64,
 ) -> f64 {
-    let square = |point: usize, force_n: f64| {
-        problem.weights.map_or(1.0, |all| all[point]) * force_n * force_n
-    };
+    let square = |point: usize, force_n: f64| problem.weight(point) * force_n * force_n;
     let sum = |force_n: &dyn Fn(usize) -> f64, points: &[usize]| -> f64 {
         points
             .iter()

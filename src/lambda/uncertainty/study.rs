@@ -77,10 +77,7 @@ impl Surroundings<'_> {
     }
 
     fn weight(&self, point: usize) -> f64 {
-        let problem = &self.problem;
-        problem
-            .weights
-            .map_or(1.0, |all| all[point] / problem.heaviest())
+        self.problem.weight(point) / self.problem.heaviest()
     }
 
     /// The places of a reach and their weights.
