@@ -354,10 +354,14 @@ pub(crate) fn clearance_of_m(
         let distance = iron.distance_m([x, y, z]);
         let least_m = CLOSEST * scene.winding.inner_radius_m;
         if distance - reach_m < least_m {
+            let place = if distance < 0.0 {
+                format!("lies {:.3} mm inside", -distance * 1e3)
+            } else {
+                format!("is {:.3} mm from the surface of", distance * 1e3)
+            };
             return Err(RunError::Input(format!(
-                "point {number} ({x}, {y}, {z} m) is {:.3} mm from the surface of [plate] or [[iron]] (below \
-                 nothing: inside), where the field is not resolved; keep {:.3} mm away from it",
-                distance * 1e3,
+                "point {number} ({x}, {y}, {z} m) {place} [plate] or [[iron]], where the field is not \
+                 resolved; keep {:.3} mm away from the surface",
                 (reach_m + least_m) * 1e3
             )));
         }

@@ -656,7 +656,7 @@ fn a_mesh_that_cannot_be_is_refused_with_its_place() {
     place
         .run(&["map", "design.toml", "--tolerance", "0.1"])
         .ends(3)
-        .says(&["from the surface of [plate] or [[iron]]"]);
+        .says(&["mm inside [plate] or [[iron]]"]);
     refused(
         &place,
         &format!("{roof}[target]\nheight_mm = 20\n"),
@@ -767,7 +767,7 @@ fn steel_that_cannot_be_is_refused_with_its_reason() {
     let inside = place.run(&["probe", "design.toml", "points.csv", "--tolerance", "0.1"]);
     inside
         .ends(3)
-        .says(&["from the surface of [plate] or [[iron]]"]);
+        .says(&["lies 2.000 mm inside [plate] or [[iron]], where"]);
     let roof = "shape = \"box\"\nsize_mm = [60, 60, 4]\ncenter_mm = [0, 0, 20]\n";
     design(&place, &body(roof));
     let map = ["map", "design.toml", "--out", "out", "--tolerance", "0.1"];
