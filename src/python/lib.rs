@@ -15,9 +15,10 @@ use numpy::{IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
+use fluxform::cli::failure::Failure;
 use fluxform::commands::map::tabulated;
 use fluxform::commands::probe::{ProbeRequest, ProbeTable, probe};
-use fluxform::design::{Design, Need};
+use fluxform::design::{Design, InvalidDocument, Need, source};
 use fluxform::field::components::Components;
 
 mod bundle;
@@ -82,10 +83,19 @@ fn run<'py>(
 /// The design of a document, its faults raised.
 fn design(py: Python, (name, text): Document, need: Need) -> PyResult<Design> {
     let read = Design::from_toml(&text, &name, need);
-    read.map(|(design, _)| design).map_err(|document| {
-        let failure = fluxform::cli::failure::Failure::Documents(vec![document]);
-        raised(py, &failure, None)
-    })
+    read.map(|(design, _)| design)
+        .map_err(|document| invalid(py, document))
+}
+
+fn invalid(py: Python, document: InvalidDocument) -> PyErr {
+    raised(py, &Failure::Documents(vec![document]), None)
+}
+
+/// The text of a design or shape in the file `path`; why it cannot be read is raised.
+#[pyfunction]
+fn text_of(py: Python, path: PathBuf) -> PyResult<String> {
+    py.detach(|| source::text_of(&path))
+        .map_err(|document| invalid(py, document))
 }
 
 /// Reads a design and returns its name; every fault is raised.
@@ -166,7 +176,7 @@ fn tabulate<'py>(
             "invalid components {components:?}: one of {}",
             names.join(", ")
         );
-        raised(py, &fluxform::cli::failure::Failure::Usage(message), None)
+        raised(py, &Failure::Usage(message), None)
     })?;
     let made = Job::new(progress).result(py, move |progress| {
         tabulated(&design, components, tolerance, progress)
@@ -202,5 +212,5 @@ mod _native {
     #[pymodule_export]
     use super::bundle::Bundle;
     #[pymodule_export]
-    use super::{check_design, fields, program, run, tabulate};
+    use super::{check_design, fields, program, run, tabulate, text_of};
 }

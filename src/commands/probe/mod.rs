@@ -84,14 +84,15 @@ const PORTION: usize = 256;
 /// point, with steel to the tolerance of the largest |grad B| at its height.
 ///
 /// # Errors
-/// A design that cannot be computed; a point on a winding's edge or on the steel; a magnet that
-/// touches the array, where the force is requested; interruption.
+/// A design that cannot be computed; a point that is not finite, on a winding's edge or on the steel; a
+/// magnet that touches the array, where the force is requested; interruption.
 pub fn probe(
     design: &Design,
     points_m: Vec<[f64; 3]>,
     request: ProbeRequest,
     progress: &dyn Progress,
 ) -> Result<ProbeTable, RunError> {
+    finite(&points_m)?;
     let scene = Scene::with_tolerance(design, request.tolerance)?;
     let solved = solve_anywhere(&scene, points_m.iter().map(|p| p[2]))?;
     let groups = groups(&scene, &points_m)?;
@@ -164,6 +165,19 @@ pub fn probe(
         warnings: solved.above_knee(&scene).into_iter().collect(),
         accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
     })
+}
+
+/// Refuses coordinates that are no numbers: no error could be stated of a field there.
+fn finite(points_m: &[[f64; 3]]) -> Result<(), RunError> {
+    let finite = |point: &[f64; 3]| point.iter().all(|x| x.is_finite());
+    let Some(row) = points_m.iter().position(|point| !finite(point)) else {
+        return Ok(());
+    };
+    let [x, y, z] = points_m[row];
+    Err(RunError::Input(format!(
+        "point {} ({x}, {y}, {z} m): expected finite coordinates",
+        row + 1
+    )))
 }
 
 /// The steel of `scene` for points at `heights_m`.

@@ -87,11 +87,6 @@ class _Document:
         return f"{type(self).__name__}({self.path!r})"
 
 
-def _read(path):
-    with open(path, encoding="utf-8-sig", errors="strict") as file:
-        return file.read()
-
-
 class Design(_Document):
     """Coils, cores, magnet and drivers: `Design.load("designs/seed.toml")`."""
 
@@ -102,8 +97,8 @@ class Design(_Document):
 
     @classmethod
     def load(cls, path) -> "Design":
-        """Read a design; every fault in it is raised as one `InputError`."""
-        return cls(_read(path), path)
+        """Read a design; every fault in it, and a file that cannot be read, is raised as one `InputError`."""
+        return cls(_native.text_of(path), path)
 
     def evaluate(self, **options) -> Result:
         """The coil as given: circuit, field and force at the target, limits. As `fluxform evaluate`."""
@@ -139,7 +134,7 @@ class Shape(_Document):
     def load(cls, path, **options) -> "Shape":
         """A shape file, or a surface with `unit`, `translate`, `rotate`, `grid` and so on."""
         toml = os.fspath(path).lower().endswith(".toml")
-        return cls(_read(path) if toml else None, path, options)
+        return cls(_native.text_of(path) if toml else None, path, options)
 
     def points(self, **options) -> Result:
         """The constraint points: `x_m`, `y_m`, `height_m`, `normal_x` ... as arrays, and the summary

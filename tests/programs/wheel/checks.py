@@ -136,7 +136,26 @@ def failures():
         assert named[0].file == "wrong.toml" and named[0].line == 3, named
         assert "length_mm" in named[0].advice and any("length_mm" in advice for advice in error.advice)
         assert "Causes:" in str(error.explain())
+    # A file that is no text, and one that is not there: what the program says of them, not UnicodeDecodeError.
+    pathlib.Path("binary.toml").write_bytes(b"\x7fELF\x02\xff")
+    for load in [fluxform.Design.load, fluxform.Shape.load]:
+        for path, said in [("binary.toml", "not UTF-8"), (pathlib.Path("none.toml"), "cannot read")]:
+            try:
+                load(path)
+                raise AssertionError("read")
+            except fluxform.InputError as error:
+                assert error.code == "E301" and said in error.message, error
+                assert error.faults[0].file == str(path), error.faults
+    # A mark at the beginning is no fault.
+    pathlib.Path("marked.toml").write_bytes(b"\xef\xbb\xbf" + AIR.replace("\n", "\r\n").encode())
+    assert fluxform.Design.load("marked.toml").evaluate().design == "small"
     design, shape = written()
+    for bad in [float("nan"), float("inf")]:
+        try:
+            design.fields([[0.007, 0.0, 0.03], [bad, 0.0, 0.03]])
+            raise AssertionError("computed")
+        except fluxform.InputError as error:
+            assert "point 2" in error.message and "finite" in error.message, error
     try:
         design.evaluate(tolernce=1e-6)
         raise AssertionError("accepted")
