@@ -196,10 +196,7 @@ pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
     let name = file.as_given().display().to_string();
     let bytes = bytes_of(file, "a CSV table with columns x_m,y_m,z_m")?;
     let columns = read_columns(&name, bytes.as_slice(), &["x_m", "y_m", "z_m"])?;
-    if columns[0].is_empty() {
-        let message = format!("{name}: the table has a header and no rows: expected a point a row");
-        return Err(Failure::Input(message));
-    }
+    has_rows(&name, columns[0].len(), "a point")?;
     let points = (0..columns[0].len())
         .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
         .collect();
@@ -217,7 +214,18 @@ pub fn scan(file: &FileArgument, coils: usize) -> Result<(Scan, Input), Failure>
         "a CSV table with columns x_m,y_m,z_m and what was measured",
     )?;
     let scan = Scan::read(&name, &bytes, coils)?;
+    has_rows(&name, scan.rows(), "a measurement")?;
     Ok((scan, Input::of_bytes(name, &bytes)))
+}
+
+/// Refuses a table of no rows; `what` a row holds.
+fn has_rows(name: &str, rows: usize, what: &str) -> Result<(), Failure> {
+    if rows == 0 {
+        let message =
+            format!("{name}: the table has a header and no rows: expected {what} per row");
+        return Err(Failure::Input(message));
+    }
+    Ok(())
 }
 
 /// A trajectory, and its entry among the inputs.

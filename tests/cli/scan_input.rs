@@ -1,0 +1,67 @@
+//! `probe`: scans and points that are not what they look like, and the advice they get.
+
+use crate::SEED;
+use fluxform_testing::place::Place;
+
+/// Coil and current of a scan of one coil.
+const DRIVE: (usize, f64) = (4, 1.3);
+
+/// Places over the middle coil, not in line with its axis.
+fn places() -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for z in [0.0113, 0.0191, 0.0347] {
+        for y in [-0.0171, 0.0043, 0.0237] {
+            for x in [-0.0219, -0.0031, 0.0133, 0.0311] {
+                points.push([x, y, z]);
+            }
+        }
+    }
+    points
+}
+
+/// Position and field of the driven coil at places, by the program.
+fn rows(place: &Place) -> Vec<[f64; 6]> {
+    let points = places();
+    let mut table = "x_m,y_m,z_m\n".to_owned();
+    for [x, y, z] in &points {
+        table.push_str(&format!("{x},{y},{z}\n"));
+    }
+    let ran = place.run_with_input(&["probe", SEED, "-", "-q"], &table);
+    let printed = ran.ends(0).out;
+    let of_coil = printed.lines().skip(1).skip(DRIVE.0).step_by(9);
+    let rows: Vec<[f64; 6]> = points
+        .into_iter()
+        .zip(of_coil)
+        .map(|([x, y, z], line)| {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            let [bx, by, bz] = std::array::from_fn(|axis| DRIVE.1 * cells[4 + axis]);
+            [x, y, z, bx, by, bz]
+        })
+        .collect();
+    assert_eq!(rows.len(), 36);
+    rows
+}
+
+/// A scan of `rows` with the columns `drive,field` of these names.
+fn scan(rows: &[[f64; 6]], drive: &str, field: &str) -> String {
+    let cells = |[x, y, z, bx, by, bz]: &[f64; 6]| {
+        let (coil, current_a) = DRIVE;
+        format!("{x},{y},{z},{coil},{current_a},{bx},{by},{bz}\n")
+    };
+    let body: String = rows.iter().map(cells).collect();
+    format!("x_m,y_m,z_m,{drive},{field}\n{body}")
+}
+
+const BY_ROW: &str = "coil,current_a";
+const FIELD: &str = "bx_t,by_t,bz_t";
+
+/// Of no rows at all every one has no current.
+#[test]
+fn a_scan_without_rows_is_called_that() {
+    let place = Place::new();
+    let header = scan(&[], BY_ROW, FIELD);
+    let args = ["probe", SEED, "--compare", "-"];
+    let ran = place.run_with_input(&args, &header).ends(3);
+    assert!(!ran.err.contains("current is 0"), "{}", ran.err);
+    ran.says(&["-: the table has a header and no rows"]);
+}
