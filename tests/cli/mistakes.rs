@@ -363,7 +363,7 @@ fn points_in_millimetres_are_warned_of() {
     let place = Place::new();
     place.write("points.csv", "x_m,y_m,z_m\n0.007,0.013,20\n");
     let ran = place.run(&["probe", SEED, "points.csv"]).ends(0);
-    ran.says(&["warning: ", "look like millimetres", "divide them by 1000"]);
+    ran.says(&["warning: ", "not in metres", "divide millimetres by 1000"]);
 }
 
 #[test]

@@ -535,7 +535,7 @@ fn scans_that_cannot_be_fitted_are_refused_with_what_to_do() {
     refused(
         "mm.csv",
         &mm,
-        &["look like millimetres", "divide them by 1000"],
+        &["not in metres", "divide millimetres by 1000"],
     );
     for (name, factor, unit) in [
         ("mt.csv", 1e3, "millitesla"),

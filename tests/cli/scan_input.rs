@@ -55,6 +55,41 @@ fn scan(rows: &[[f64; 6]], drive: &str, field: &str) -> String {
 const BY_ROW: &str = "coil,current_a";
 const FIELD: &str = "bx_t,by_t,bz_t";
 
+/// Centimetres were called millimetres, and so was a point 100 m away.
+#[test]
+fn no_unit_of_length_is_guessed() {
+    let place = Place::new();
+    let rows = rows(&place);
+    let all = [
+        "millimetres by 1000",
+        "centimetres by 100",
+        "inches by 0.0254",
+    ];
+    for (per_m, fitting) in [(1e3, &all[..2]), (1e2, &all), (1.0 / 0.0254, &all)] {
+        let scaled = rows.iter();
+        let scaled: Vec<[f64; 6]> = scaled
+            .map(|[x, y, z, b @ ..]| [x * per_m, y * per_m, z * per_m, b[0], b[1], b[2]])
+            .collect();
+        place.write("scan.csv", &scan(&scaled, BY_ROW, FIELD));
+        let ran = place.run(&["probe", SEED, "--compare", "scan.csv"]).ends(3);
+        assert!(!ran.err.contains("look like"), "{}", ran.err);
+        ran.says(&["E307", "if they are not in metres"])
+            .says(fitting);
+    }
+    place.write("points.csv", "x_m,y_m,z_m\n0,0,100\n");
+    let far = place.run(&["probe", SEED, "points.csv"]).ends(0);
+    assert!(!far.err.contains("look like"), "{}", far.err);
+    far.says(&[
+        "warning",
+        "if they are not in metres",
+        "millimetres by 1000",
+    ]);
+    // Beyond what any of them would bring near.
+    place.write("points.csv", "x_m,y_m,z_m\n0,0,7e6\n");
+    let far = place.run(&["probe", SEED, "points.csv"]).ends(0);
+    far.says(&["if they are not in metres: convert them"]);
+}
+
 /// Of no rows at all every one has no current.
 #[test]
 fn a_scan_without_rows_is_called_that() {

@@ -10,11 +10,15 @@ const CLOSE: f64 = 0.35;
 /// Least cosine between measured and computed for a ratio to mean a unit.
 const ALIKE: f64 = 0.7;
 
-/// Probable unit of the coordinates, if not metres.
-pub(in crate::commands::probe) fn coordinates(
-    design: &Design,
-    positions_m: &[[f64; 3]],
-) -> Option<String> {
+/// Units that coordinates may be in, and what makes metres of them.
+const LENGTHS: [(f64, &str); 3] = [
+    (1e-3, "divide millimetres by 1000"),
+    (1e-2, "divide centimetres by 100"),
+    (0.0254, "multiply inches by 0.0254"),
+];
+
+/// How far the array and its workspace reach from the origin, m.
+pub(super) fn reach_m(design: &Design) -> f64 {
     let axes = &design.array.positions_m;
     let coils = axes
         .iter()
@@ -23,15 +27,34 @@ pub(in crate::commands::probe) fn coordinates(
     let diameter_m = design.coil.map_or(0.0, |coil| coil.outer_diameter_m);
     let space = &design.workspace;
     let ends = [space.x_m, space.y_m, space.z_m].map(|axis| axis.from.abs().max(axis.to.abs()));
-    let reach_m = ends.into_iter().fold(coils + diameter_m, f64::max);
+    ends.into_iter().fold(coils + diameter_m, f64::max)
+}
+
+/// That the coordinates do not look like metres, and what to do if they are in a unit that would bring them
+/// to the array. Which unit it is their size alone does not say: a scan may be far smaller than the array.
+pub(in crate::commands::probe) fn coordinates(
+    design: &Design,
+    positions_m: &[[f64; 3]],
+) -> Option<String> {
+    let reach_m = reach_m(design);
     let places = positions_m.iter().flatten();
     let most_m = places.fold(0.0_f64, |most, x| most.max(x.abs()));
-    (most_m > BEYOND * reach_m).then(|| {
-        format!(
-            "x_m, y_m and z_m reach {most_m} m where the array and its workspace reach {reach_m:.3} \
-             m, so they look like millimetres; divide them by 1000"
-        )
-    })
+    if most_m <= BEYOND * reach_m {
+        return None;
+    }
+    let near = LENGTHS
+        .iter()
+        .filter(|(unit_m, _)| unit_m * most_m <= BEYOND * reach_m);
+    let cures: Vec<&str> = near.map(|(_, cure)| *cure).collect();
+    let cures = if cures.is_empty() {
+        "convert them".to_owned()
+    } else {
+        cures.join("; ")
+    };
+    Some(format!(
+        "x_m, y_m and z_m reach {most_m} m where the array and its workspace reach {reach_m:.3} m; if they are \
+         not in metres: {cures}"
+    ))
 }
 
 /// Probable unit of the measured numbers, or the currents, if not tesla and ampere; `predicted`
