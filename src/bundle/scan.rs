@@ -52,6 +52,17 @@ impl Measured {
     pub fn column(self) -> String {
         format!("{}_{}", self.stem(), self.unit())
     }
+
+    /// Whether `probe` writes this quantity to a column `name`: measured, per ampere, computed or a residual.
+    fn is_written_as(self, name: &str) -> bool {
+        let (stem, unit) = (self.stem(), self.unit());
+        let of_table = ["design", "residual", "fitted_residual"];
+        name == self.column()
+            || name == format!("{stem}_{unit}_per_a")
+            || of_table
+                .iter()
+                .any(|what| name == format!("{stem}_{what}_{unit}"))
+    }
 }
 
 /// A scan as read.
@@ -74,7 +85,7 @@ impl Scan {
     /// or `current_0_a,current_1_a,...` (coils without a column carry none).
     ///
     /// # Errors
-    /// Missing columns, cells that are no numbers, coils that `coils` coils do not have.
+    /// Missing or misnamed columns, cells that are no numbers, coils that `coils` coils do not have.
     pub fn read(name: &str, bytes: &[u8], coils: usize) -> Result<Self, TableError> {
         let head = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
         let head = String::from_utf8_lossy(head);
@@ -95,6 +106,10 @@ impl Scan {
                 "expected at least one measured column, in SI: bx_t, by_t, bz_t, or one of \
                  dbx_dx_t_per_m to dbz_dz_t_per_m, found {shown:?}"
             )));
+        }
+        let faults = misnamed(name, &header);
+        if !faults.is_empty() {
+            return Err(TableError { faults });
         }
         let drives = drive_columns(&header, coils).map_err(one)?;
         let mut requested: Vec<String> = PLACE.map(str::to_owned).to_vec();
@@ -165,6 +180,58 @@ impl Scan {
             .map(|(name, values)| (name.as_str(), Column::Number(values)))
             .collect();
         write_columns(out, &columns)
+    }
+}
+
+/// Columns named almost as one that is read. They would be passed over like a comment, and what they hold
+/// would be missing from the comparison: without a coil's current its field goes into the other scales.
+fn misnamed(name: &str, header: &[&str]) -> Vec<String> {
+    let fault = |cell: &&str| {
+        let expected = expected_for(cell)?;
+        let shown: String = cell.chars().take(40).collect();
+        Some(format!(
+            "{name}:1: column {shown}: this name is not read, expected {expected}, in SI units; a column of \
+             something else needs a name that does not begin like that"
+        ))
+    };
+    header.iter().filter_map(fault).take(20).collect()
+}
+
+/// What was probably meant by `cell`; `None` where it is read, is one of the columns that `probe` writes, or
+/// begins like none of them.
+fn expected_for(cell: &str) -> Option<String> {
+    let lower = cell.to_ascii_lowercase();
+    if let Some(rest) = lower.strip_prefix("current") {
+        return current_for(cell, rest);
+    }
+    if Measured::all().any(|quantity| quantity.is_written_as(cell)) {
+        return None;
+    }
+    let short = lower.replacen("b_", "b", 1);
+    let short = short.replacen(['/', ' ', '-'], "_", 1);
+    let begins = |stem: &str| {
+        let rest = short.strip_prefix(stem);
+        // A name may well begin with the letters of a word like "bypass".
+        let word = |rest: &str| stem == "by" && rest.starts_with(char::is_alphabetic);
+        rest.is_some_and(|rest| !word(rest))
+    };
+    if let Some(quantity) = Measured::all().find(|quantity| begins(quantity.stem())) {
+        return Some(quantity.column());
+    }
+    let stem = ["dbx", "dby", "dbz"]
+        .into_iter()
+        .find(|stem| begins(stem))?;
+    let all = ["x", "y", "z"].map(|along| format!("{stem}_d{along}_t_per_m"));
+    Some(all.join(", "))
+}
+
+/// As [`expected_for`], for a cell that is "current" and `rest`.
+fn current_for(cell: &str, rest: &str) -> Option<String> {
+    let digits: String = rest.chars().filter(char::is_ascii_digit).collect();
+    match digits.parse::<usize>() {
+        Ok(coil) => Some(format!("current_{coil}_a")).filter(|expected| cell != expected),
+        Err(_) if cell == "current_a" => None,
+        Err(_) => Some("current_a beside coil, or current_0_a,current_1_a,...".to_owned()),
     }
 }
 

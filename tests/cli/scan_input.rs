@@ -55,6 +55,62 @@ fn scan(rows: &[[f64; 6]], drive: &str, field: &str) -> String {
 const BY_ROW: &str = "coil,current_a";
 const FIELD: &str = "bx_t,by_t,bz_t";
 
+/// `current5_a` was passed over like a comment, and its field went into the scale of another coil.
+#[test]
+fn columns_named_almost_as_one_that_is_read_are_refused() {
+    let place = Place::new();
+    let rows = rows(&place);
+    for (drive, field, found, expected) in [
+        ("current_4_a,current5_a", FIELD, "current5_a", "current_5_a"),
+        (
+            "current_4_a,current_05_a",
+            FIELD,
+            "current_05_a",
+            "current_5_a",
+        ),
+        ("coil,Current_A", FIELD, "Current_A", "current_a"),
+        (BY_ROW, "bx_t,by_t,Bz_T", "Bz_T", "bz_t"),
+        (BY_ROW, "bx_mt,by_t,bz_t", "bx_mt", "bx_t"),
+        (BY_ROW, "bx_t,B_y (T),bz_t", "B_y (T)", "by_t"),
+        (BY_ROW, "bx_t,dby/dz,bz_t", "dby/dz", "dby_dz_t_per_m"),
+        (
+            BY_ROW,
+            "bx_t,by_t,dbz_dx_mt_per_mm",
+            "dbz_dx_mt_per_mm",
+            "dbz_dx_t_per_m",
+        ),
+    ] {
+        place.write("scan.csv", &scan(&rows, drive, field));
+        let ran = place.run(&["probe", SEED, "--compare", "scan.csv"]).ends(3);
+        let found = format!("scan.csv:1: column {found}: this name is not read");
+        ran.says(&["E302", &found, &format!("expected {expected}")]);
+    }
+    // One more column than the current by row.
+    let with_more = |name: &str| {
+        let text = scan(&rows, BY_ROW, FIELD);
+        let lines = text.lines().enumerate();
+        let lines = lines.map(|(at, line)| match at {
+            0 => format!("{line},{name}\n"),
+            _ => format!("{line},0.7\n"),
+        });
+        place.write("scan.csv", &lines.collect::<String>());
+        place.run(&["probe", SEED, "--compare", "scan.csv"])
+    };
+    with_more("current_2")
+        .ends(3)
+        .says(&["expected current_2_a"]);
+    // Anything else is somebody's own, also what `probe` itself writes.
+    for own in [
+        "time_s",
+        "byte",
+        "coil_temperature_c",
+        "bz_t_per_a",
+        "bz_residual_t",
+    ] {
+        with_more(own).ends(0);
+    }
+}
+
 /// Centimetres were called millimetres, and so was a point 100 m away.
 #[test]
 fn no_unit_of_length_is_guessed() {
