@@ -430,7 +430,7 @@ pub struct ScanPlace {
 pub struct FitFile {
     /// One a coil that carried current; empty where scales were not fitted.
     pub scales: Vec<CoilScale>,
-    /// The line for the design's `[array]` with the scales in it; null where none was determined.
+    /// The line for the design's `[array]` with the scales in it; null unless a fit that settled gives one.
     pub gain_toml: Option<String>,
     /// A constant field beside that of the coils, T.
     pub background_t: Option<[Option<f64>; 3]>,

@@ -1,5 +1,7 @@
 //! `probe`: scans and points that are not what they look like, and the advice they get.
 
+use serde_json::Value;
+
 use crate::SEED;
 use fluxform_testing::place::Place;
 
@@ -54,6 +56,82 @@ fn scan(rows: &[[f64; 6]], drive: &str, field: &str) -> String {
 
 const BY_ROW: &str = "coil,current_a";
 const FIELD: &str = "bx_t,by_t,bz_t";
+
+fn compared(place: &Place, more: &[&str]) -> Value {
+    let args = ["probe", SEED, "--compare", "scan.csv", "--format", "json"];
+    place.run(&[&args[..], more].concat()).ends(0).json()
+}
+
+fn warned(compared: &Value) -> String {
+    compared["warnings"].to_string()
+}
+
+/// Above a fit that moved the scan to where there is no field nothing was left to change: it was called
+/// converged, and the coil's opposite sign went unnamed.
+#[test]
+fn a_scan_that_fits_best_far_away_did_not_settle() {
+    let place = Place::new();
+    // The sensor's z axis points down: height and vertical field with the other sign.
+    let mirrored = rows(&place).into_iter();
+    let mirrored: Vec<[f64; 6]> = mirrored
+        .map(|[x, y, z, bx, by, bz]| [x, y, -z, bx, by, -bz])
+        .collect();
+    place.write("scan.csv", &scan(&mirrored, BY_ROW, FIELD));
+    for more in [&[][..], &["--fit", "position"]] {
+        let report = compared(&place, more);
+        let fit = &report["fit"];
+        assert_eq!(fit["converged"], false, "{fit:#}");
+        assert!(fit["gain_toml"].is_null(), "{fit:#}");
+        for shift in fit["position_m"].as_array().unwrap() {
+            assert!(shift.as_f64().unwrap().abs() < 0.3, "{fit:#}");
+        }
+        let warnings = warned(&report);
+        for part in ["did not settle", "coil 4", "opposite sign", "point down"] {
+            assert!(warnings.contains(part), "{part}: {warnings}");
+        }
+    }
+    let scale = compared(&place, &["--fit", "scale"]);
+    assert_eq!(scale["fit"]["converged"], true);
+    assert!(warned(&scale).contains("opposite sign"), "{scale:#}");
+}
+
+/// A height of 129180 m +- 3.5e22 was said to explain three quarters of swapped leads.
+#[test]
+fn nothing_far_from_the_array_explains_a_scan() {
+    let place = Place::new();
+    let swapped: Vec<[f64; 6]> = rows(&place)
+        .into_iter()
+        .map(|[x, y, z, bx, by, bz]| [x, y, z, -bx, -by, -bz])
+        .collect();
+    place.write("scan.csv", &scan(&swapped, BY_ROW, FIELD));
+    let report = compared(&place, &[]);
+    assert_eq!(report["fit"]["converged"], true);
+    assert_eq!(report["best_explanation"], "scale");
+    let named = report["explanations"].as_array().unwrap().iter();
+    let named: Vec<&str> = named.filter_map(|e| e["parameter"].as_str()).collect();
+    assert!(named.contains(&"rotation"), "{named:?}");
+    for far in ["height", "position"] {
+        assert!(!named.contains(&far), "{named:?}");
+    }
+}
+
+/// The bound is one of where the scan ends up, not of how wrong its coordinates may be.
+#[test]
+fn a_scan_with_another_origin_is_moved_to_the_array() {
+    let place = Place::new();
+    let moved: Vec<[f64; 6]> = rows(&place)
+        .into_iter()
+        .map(|[x, y, z, bx, by, bz]| [x + 0.021, y, z - 0.043, bx, by, bz])
+        .collect();
+    place.write("scan.csv", &scan(&moved, BY_ROW, FIELD));
+    let report = compared(&place, &[]);
+    let fit = &report["fit"];
+    assert_eq!(fit["converged"], true, "{fit:#}");
+    for (axis, shift) in [-0.021, 0.0, 0.043].into_iter().enumerate() {
+        let found = fit["position_m"][axis].as_f64().unwrap();
+        assert!((found - shift).abs() < 1e-7, "{fit:#}");
+    }
+}
 
 /// `current5_a` was passed over like a comment, and its field went into the scale of another coil.
 #[test]

@@ -259,7 +259,8 @@ impl Task<'_> {
             None,
             self.progress,
         )?;
-        if found.linear.rank == 0 {
+        // Of a scan moved away from the array nothing is left to compare: that explains nothing.
+        if found.linear.rank == 0 || found.leaves_array {
             return Ok(None);
         }
         let alone = parameters.len() == 1;

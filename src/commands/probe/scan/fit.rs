@@ -1,7 +1,8 @@
 //! Scales, background and the sensor's frame, fitted to a scan all at once.
 //!
 //! Gauss-Newton steps: the scales and the background are linear, the frame is linearised by central
-//! differences of the computed field at every step. A step that leaves more is halved.
+//! differences of the computed field at every step. A step that leaves more is halved, and so is one that moves
+//! the scan away from the array: far away every field fits as well as none, and no step changes anything.
 
 use super::model::{Model, Pose, STEP_M};
 use crate::RunError;
@@ -27,6 +28,16 @@ pub struct Fitted {
     pub position: bool,
     /// How it is turned.
     pub rotation: bool,
+}
+
+impl Fitted {
+    /// The scales alone.
+    pub(super) const SCALE: Self = Self {
+        scale: true,
+        background: false,
+        position: false,
+        rotation: false,
+    };
 }
 
 /// A number that is fitted.
@@ -95,6 +106,8 @@ pub(super) struct Fit {
     pub(super) left: f64,
     pub(super) iterations: usize,
     pub(super) converged: bool,
+    /// The last step would move the scan away from the array: nothing near it fits best.
+    pub(super) leaves_array: bool,
 }
 
 /// A state of the fit, and what it gives.
@@ -145,7 +158,9 @@ pub(super) fn fit(
             None => break (columns, linear),
         }
     };
+    let leaves_array = !converged && task.leaves_array(&stepped(&state, &linear, &steps, 1.0));
     Ok(Fit {
+        leaves_array,
         values: state.values,
         columns,
         linear,
@@ -155,6 +170,13 @@ pub(super) fn fit(
         iterations: iterations + before.map_or(0, |fit| fit.iterations),
         converged,
     })
+}
+
+/// The values after `share` of a step.
+fn stepped(state: &State, linear: &Solution, steps: &[f64], share: f64) -> Vec<f64> {
+    let changes = linear.values.iter().zip(steps).map(|(v, s)| share * v * s);
+    let values = state.values.iter().zip(changes);
+    values.map(|(value, change)| value + change).collect()
 }
 
 /// The design as it is.
@@ -210,6 +232,11 @@ impl Task<'_> {
             }
         }
         pose
+    }
+
+    fn leaves_array(&self, values: &[f64]) -> bool {
+        let [x, y, z] = self.pose(values).shift_m;
+        x.hypot(y).hypot(z) > self.model.farthest_shift_m()
     }
 
     fn scaled(&self, values: &[f64], contributions: &[f64]) -> Vec<f64> {
@@ -300,13 +327,11 @@ impl Task<'_> {
     ) -> Result<Option<State>, RunError> {
         let mut share = 1.0;
         for _ in 0..HALVINGS {
-            let changes = linear.values.iter().zip(steps).map(|(v, s)| share * v * s);
-            let values = state
-                .values
-                .iter()
-                .zip(changes)
-                .map(|(v, c)| v + c)
-                .collect();
+            let values = stepped(state, linear, steps, share);
+            if self.leaves_array(&values) {
+                share *= 0.5;
+                continue;
+            }
             match self.state(values) {
                 Ok(next) if next.left < state.left => return Ok(Some(next)),
                 // Into a winding's edge or the steel is too far.

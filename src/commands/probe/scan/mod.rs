@@ -129,9 +129,7 @@ pub fn compare(
     if let Some(hint) = units::magnitudes(scan, &predicted) {
         return Err(refused(hint));
     }
-    let field_t = rms(scan, &scan.values, Kind::Field)
-        .unwrap_or(1e-3)
-        .max(1e-9);
+    let field_t = field_size_t(scan);
     let noisy = noise::fit(&model, scan, &parameters, request, field_t, progress)?;
     // Explanations are held against the noise that the fit settled at.
     let weighted = Weighted::of(scan, predicted, noisy.weights(scan));
@@ -157,6 +155,7 @@ pub fn compare(
     };
     let mut warnings: Vec<String> = curve_warning(&scene).into_iter().collect();
     warnings.extend(noisy.warning());
+    warnings.extend(scale_warnings(&task, request, &parameters, &noisy)?);
     let file = ScanFile {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -276,6 +275,12 @@ fn rms(scan: &Scan, values: &[f64], kind: Kind) -> Option<f64> {
             (count + 1, sum + value * value)
         });
     (count > 0).then(|| (sum / count as f64).sqrt())
+}
+
+/// Size of the measured field, or one like it where there is none; never 0.
+fn field_size_t(scan: &Scan) -> f64 {
+    let measured = rms(scan, &scan.values, Kind::Field);
+    measured.unwrap_or(1e-3).max(1e-9)
 }
 
 fn accuracy(solved: &Solved, estimate: f64) -> BTreeMap<String, StageAccuracy> {
@@ -398,8 +403,10 @@ fn fit_file(
         let errors = both.map(|(_, error)| error.map(|e| e * unit));
         (fitted.then_some(values), fitted.then_some(errors))
     };
-    let (scales, gain_toml) = coil_scales(design, parameters, &found, warnings);
+    let (scales, mut gain_toml) = coil_scales(design, parameters, &found);
     if !fit.converged {
+        // Numbers on the way somewhere are not for a design.
+        gain_toml = None;
         warnings.push(
             "the fit did not settle: its numbers are those of the last step; fit less with --fit, \
              or correct the scan's coordinates first"
@@ -436,7 +443,6 @@ fn coil_scales(
     design: &Design,
     parameters: &[Parameter],
     found: &dyn Fn(Parameter) -> (Option<f64>, Option<f64>),
-    warnings: &mut Vec<String>,
 ) -> (Vec<CoilScale>, Option<String>) {
     let mut scales = Vec::new();
     let mut gains = design.array.gain.clone();
@@ -449,7 +455,6 @@ fn coil_scales(
         if let Some(gain) = gain {
             gains[coil] = gain;
         }
-        warnings.extend(scale_warning(coil, scale, standard_error));
         scales.push(CoilScale {
             coil,
             scale,
@@ -463,9 +468,33 @@ fn coil_scales(
     (scales, line)
 }
 
-/// A scale that betrays a mistake of the set-up.
-fn scale_warning(coil: usize, scale: Option<f64>, error: Option<f64>) -> Option<String> {
-    let (scale, error) = (scale?, error?);
+/// Scales that betray a mistake of the set-up: those of the fit, or where it did not settle scales alone. These
+/// always settle, and their signs may say why the rest did not.
+fn scale_warnings(
+    task: &explain::Task,
+    request: &ScanRequest,
+    parameters: &[Parameter],
+    noisy: &NoisyFit,
+) -> Result<Vec<String>, RunError> {
+    if noisy.fit.converged {
+        return Ok(warnings_of_scales(parameters, noisy));
+    }
+    let (scan, coils) = (task.scan, task.design.array.positions_m.len());
+    let scales = fit::parameters(Fitted::SCALE, scan, coils);
+    let (size_t, progress) = (task.field_t, task.progress);
+    let alone = noise::fit(task.model, scan, &scales, request, size_t, progress)?;
+    Ok(warnings_of_scales(&scales, &alone))
+}
+
+fn warnings_of_scales(parameters: &[Parameter], noisy: &NoisyFit) -> Vec<String> {
+    let warning = |(k, parameter): (usize, &Parameter)| match *parameter {
+        Parameter::Scale(coil) => scale_warning(coil, noisy.fit.values[k], noisy.error(k)?),
+        _ => None,
+    };
+    parameters.iter().enumerate().filter_map(warning).collect()
+}
+
+fn scale_warning(coil: usize, scale: f64, error: f64) -> Option<String> {
     if scale.abs() <= 3.0 * error {
         return Some(format!(
             "coil {coil}: the scan shows no field of it beyond three standard errors; is it \

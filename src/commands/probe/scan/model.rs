@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::units::reach_m;
 use crate::RunError;
 use crate::bundle::scan::{Measured, Scan};
 use crate::commands::probe::FieldAt;
@@ -78,6 +79,12 @@ impl<'a> Model<'a> {
             .iter()
             .map(distance)
             .fold(0.0, f64::max)
+    }
+
+    /// Largest shift that leaves the scan over the array, wherever its coordinates begin, m.
+    pub(super) fn farthest_shift_m(&self) -> f64 {
+        let [x, y, z] = self.middle_m;
+        x.hypot(y).hypot(z) + self.extent_m() + reach_m(self.scene.design)
     }
 
     fn positions_m(&self, pose: Pose) -> Vec<[f64; 3]> {
