@@ -52,7 +52,7 @@ pub(in crate::commands::probe) fn coordinates(
         cures.join("; ")
     };
     Some(format!(
-        "x_m, y_m and z_m reach {most_m} m where the array and its workspace reach {reach_m:.3} m; if they are \
+        "x_m, y_m and z_m reach {most_m:.3} m where the array and its workspace reach {reach_m:.3} m; if they are \
          not in metres: {cures}"
     ))
 }
