@@ -10,8 +10,11 @@ use fluxform_numerics::vec3::{minus, norm};
 
 /// Distance in half sides from which on the nodes of a finer rule integrate the kernel.
 const NEAR: f64 = 1.1;
-/// Halvings about a place on a curved panel itself, after which what is left is nothing.
-const MOST_HALVINGS: usize = 14;
+/// Halvings about a node of a curved panel itself, after which what is left is nothing.
+const MOST_ON_PANEL: usize = 14;
+/// The same about a place off the panel, however thin the wall between: halving ends by itself, at the latest where the
+/// centres of both halves round to one.
+const MOST_OFF_PANEL: usize = 112;
 /// Nodes of the finer rule beyond the panel's own.
 const MORE_NODES: usize = 3;
 
@@ -38,6 +41,15 @@ struct Part {
     rule: Option<Rule>,
 }
 
+/// Where a place is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// A node of the panel itself.
+    OnPanel,
+    /// Anywhere else, however close: the other side of a thin wall.
+    OffPanel,
+}
+
 /// The finer rule on a part.
 pub(super) struct Rule {
     /// Nodes along each side.
@@ -59,30 +71,29 @@ impl<'a> Parts<'a> {
     }
 
     /// Visits parts small enough for their rules to integrate the kernel at `target_m`.
-    pub(super) fn visit(&mut self, target_m: Point, visit: &mut impl FnMut(&Rule)) {
-        self.visit_part(target_m, 0, 0, visit);
+    pub(super) fn visit(&mut self, target_m: Point, place: Place, visit: &mut impl FnMut(&Rule)) {
+        let most = match place {
+            Place::OnPanel => MOST_ON_PANEL,
+            Place::OffPanel => MOST_OFF_PANEL,
+        };
+        self.visit_part(target_m, 0, most, visit);
     }
 
     fn visit_part(
         &mut self,
         target_m: Point,
         number: usize,
-        halvings: usize,
+        halvings_left: usize,
         visit: &mut impl FnMut(&Rule),
     ) {
         let part = &self.parts[number].panel;
         let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
         let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
-        // Of a plane panel nothing is left to singularities: halving ends by itself, at the latest where
-        // the centres of both halves round to one.
-        let halved = match part.plane {
-            None => halvings < MOST_HALVINGS,
-            Some(_) => halvings < 8 * MOST_HALVINGS && half > coordinate_rounding_m(target_m),
-        };
+        let halved = halvings_left > 0 && half > coordinate_rounding_m(target_m);
         if distance < NEAR * half && halved {
             let first = self.halves(number);
             for half in [first, first + 1] {
-                self.visit_part(target_m, half, halvings + 1, visit);
+                self.visit_part(target_m, half, halvings_left - 1, visit);
             }
         } else {
             let (whole, part) = (self.parts[0].panel, &mut self.parts[number]);

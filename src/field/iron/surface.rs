@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
 use super::near_windings::Windings;
-use super::parts::{Halvings, Parts, coordinate_rounding_m};
+use super::parts::{Halvings, Parts, Place, coordinate_rounding_m};
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
@@ -99,18 +99,20 @@ impl Surface {
     }
 
     /// Adds to `row` what the layer of every node gives at `target_m`:
-    /// PV int n'.(x - y) / (4 pi |x - y|^3) v(y) dS. The place of a node itself counts as nothing.
+    /// int n'.(x - y) / (4 pi |x - y|^3) v(y) dS, off the surface.
     pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
         for panel in 0..self.panels.len() {
-            let row = &mut row[self.nodes_of(panel)];
-            self.add_panel(target_m, panel, row, &mut self.parts_of(panel));
+            let (row, parts) = (&mut row[self.nodes_of(panel)], &mut self.parts_of(panel));
+            self.add_panel(target_m, Place::OffPanel, panel, row, parts);
         }
     }
 
-    /// The same of the nodes of one panel, which is given with its parts.
+    /// The same of the nodes of one panel, which is given with its parts, also at nodes: as a principal value, to which
+    /// the place of a node itself gives nothing.
     pub(super) fn add_panel(
         &self,
         target_m: Point,
+        place: Place,
         panel: usize,
         row: &mut [f64],
         parts: &mut Parts<'_>,
@@ -132,7 +134,7 @@ impl Surface {
                 *value += kernel(target_m, node);
             }
         } else {
-            add_near(target_m, panel.order, row, parts);
+            add_near(target_m, place, panel.order, row, parts);
         }
     }
 
@@ -145,6 +147,15 @@ impl Surface {
     pub(super) fn nodes_of(&self, panel: usize) -> std::ops::Range<usize> {
         let first = self.firsts[panel];
         first..first + self.panels[panel].order.pow(2)
+    }
+
+    /// Where a node is, seen from a panel.
+    pub(super) fn place_of(&self, node: usize, panel: usize) -> Place {
+        if self.panel_of[node] as usize == panel {
+            Place::OnPanel
+        } else {
+            Place::OffPanel
+        }
     }
 
     /// The parts of a panel: none yet.
@@ -212,7 +223,7 @@ impl Surface {
             let parts = halvings
                 .entry(number)
                 .or_insert_with(|| self.parts_of(number));
-            parts.visit(target_m, &mut |rule| {
+            parts.visit(target_m, Place::OffPanel, &mut |rule| {
                 for (k, node) in rule.nodes.iter().enumerate() {
                     let first = &rule.bases[0][k / rule.order * count..][..count];
                     let second = &rule.bases[1][k % rule.order * count..][..count];
@@ -382,8 +393,8 @@ pub(super) fn mirrored(node: &Node, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> N
 }
 
 /// Adds to `row` what the nodes of a panel give at `target_m` close to it, `count` along each side.
-fn add_near(target_m: Point, count: usize, row: &mut [f64], parts: &mut Parts<'_>) {
-    parts.visit(target_m, &mut |rule| {
+fn add_near(target_m: Point, place: Place, count: usize, row: &mut [f64], parts: &mut Parts<'_>) {
+    parts.visit(target_m, place, &mut |rule| {
         let [first, second] = &rule.bases;
         let mut line = [0.0; MOST_ORDER];
         let lines = rule.nodes.chunks_exact(rule.order);

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::blocks::{BlockRow, Blocks, Clusters, FAR};
 use super::bodies::Iron;
 use super::face::Node;
+use super::parts::Place;
 use super::surface::{Surface, mirrored};
 use fluxform_numerics::gmres::gmres;
 use fluxform_numerics::lu::Factored;
@@ -341,12 +342,16 @@ impl Assembly<'_> {
             let strengths = &self.strengths[of_panel.clone()];
             let mut row = vec![0.0; of_panel.len()];
             let mut halvings = self.surface.parts_of(*panel);
-            for (signs, part) in self.images.iter().zip(&mut parts) {
-                for (at, target) in targets.iter().enumerate() {
-                    let target = &self.surface.nodes[*target];
+            for (image, (signs, part)) in self.images.iter().zip(&mut parts).enumerate() {
+                for (at, node) in targets.iter().enumerate() {
+                    let place = match image {
+                        0 => self.surface.place_of(*node, *panel),
+                        _ => Place::OffPanel,
+                    };
+                    let target = &self.surface.nodes[*node];
                     let target_m = mirrored(target, *signs, self.iron.planes_m).place_m;
                     row.fill(0.0);
-                    (self.surface).add_panel(target_m, *panel, &mut row, &mut halvings);
+                    (self.surface).add_panel(target_m, place, *panel, &mut row, &mut halvings);
                     for (k, (value, strength)) in row.iter().zip(strengths).enumerate() {
                         part[(at, first + k)] = value * strength;
                     }
