@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Scene;
 use super::core_material::{Material, SceneCore};
-use super::knee::above_knee;
+use super::knee::above_knee_or;
 use super::named_files::{self, NamedContent};
 use super::passive_table::Turn;
 use crate::RunError;
@@ -274,17 +274,24 @@ impl SceneIron {
             .as_ref()
             .map_or(f64::INFINITY, |core| core.knee_t);
         let known = |peak: &Peak| (peak.field_t, peak.error_t.unwrap_or(0.0));
-        let core = above_knee(
+        // A tolerance that the same panels meet gives the same number again.
+        let finer = peaks.finer_below.map_or_else(
+            || "panels are as fine as they can be here: make the steel thicker".to_owned(),
+            |below| format!("lower --tolerance to {:.0e}", 0.5 * below),
+        );
+        let core = above_knee_or(
             peaks.cores.iter().map(known),
             of_core,
             &format!("a core of the array at {at}"),
             THICKER,
+            &finer,
         );
-        let plate = above_knee(
+        let plate = above_knee_or(
             [known(&peaks.elsewhere)],
             self.knee_t,
             &format!("the plate or [[iron]] at {at}"),
             THICKER,
+            &finer,
         );
         let put_right = self.put_right.iter().cloned();
         put_right.chain(core).chain(plate).collect()

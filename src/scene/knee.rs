@@ -3,6 +3,11 @@
 /// The advice on the cores of coils.
 pub(crate) const FOR_CORES: &str = "give core.bh_curve, or lower the current";
 
+/// Largest error of a peak, relative to it, with which it is known: beyond, panels resolve neither.
+const KNOWN: f64 = 0.3;
+/// What to do about a peak that is not known.
+const FINER: &str = "lower --tolerance";
+
 /// A sentence where the steel of `whose` is above its knee, or where the errors leave that open; `peaks_t` are its
 /// largest |B| and their stated errors, T.
 ///
@@ -13,9 +18,20 @@ pub(crate) fn above_knee(
     whose: &str,
     advice: &str,
 ) -> Option<String> {
+    above_knee_or(peaks_t, knee_t, whose, advice, FINER)
+}
+
+/// The same, and `finer` says how to know more of a peak.
+pub(super) fn above_knee_or(
+    peaks_t: impl IntoIterator<Item = (f64, f64)>,
+    knee_t: f64,
+    whose: &str,
+    advice: &str,
+    finer: &str,
+) -> Option<String> {
     let (mut surest, mut farthest) = ((0.0, 0.0), (0.0, 0.0));
     for (peak_t, error_t) in peaks_t {
-        if peak_t - error_t > surest.0 - surest.1 {
+        if error_t <= KNOWN * peak_t && peak_t - error_t > surest.0 - surest.1 {
             surest = (peak_t, error_t);
         }
         if peak_t + error_t > farthest.0 + farthest.1 {
@@ -32,7 +48,7 @@ pub(crate) fn above_knee(
     } else if farthest.0 + farthest.1 > knee_t {
         Some(format!(
             "it is not known at this tolerance whether {whose} is above the steel's knee at {knee_t} T, where the \
-             force is smaller than stated: it is computed to reach {}; lower --tolerance",
+             force is smaller than stated: it is computed to reach {}; {finer}",
             stated(farthest)
         ))
     } else {
@@ -61,5 +77,15 @@ mod tests {
         let said = said(&[(64.38, 64.24), (1.73, 0.17)]);
         assert!(said.contains("1.73 T, +/- 0.17 T, above"), "{said}");
         assert!(said.ends_with("make it thicker"), "{said}");
+    }
+
+    /// 360.8 T, +/- 307.8 T, of a wall that carries 0.88 T, was called above a knee of 1.5 T.
+    #[test]
+    fn regression_a_peak_that_no_panels_resolve_was_above_the_knee() {
+        let finer = "make the steel thicker";
+        let said = above_knee_or([(360.8, 307.8)], 1.5, "a wall", "lower the current", finer);
+        let said = said.unwrap_or_default();
+        assert!(said.contains("not known at this tolerance"), "{said}");
+        assert!(said.ends_with(finer), "{said}");
     }
 }

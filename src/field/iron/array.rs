@@ -106,6 +106,8 @@ pub struct IronArray {
     pub relative_residual: f64,
     /// Applications of the matrices.
     pub iterations: usize,
+    /// A tolerance below which finer panels are taken, as far as memory allows; `None` where they are not.
+    finer_below: Option<f64>,
     /// The next coarser solution, by which errors are estimated; `None` of a resolution asked for.
     coarser: Option<Box<Self>>,
 }
@@ -133,22 +135,30 @@ impl IronArray {
         }
         let mut first_fine = Some(fine?);
         let mut coarse = Self::at_resolution(coils, iron, tolerance, first)?;
+        let mut is_finest = false;
         for tier in first + 1..=last {
             let next = first_fine
                 .take()
                 .map_or_else(|| Self::at_resolution(coils, iron, tolerance, tier), Ok);
             let mut fine = match next {
-                Err(Unsolved::TooLarge { .. }) => break,
+                Err(Unsolved::TooLarge { .. }) => {
+                    is_finest = true;
+                    break;
+                }
                 other => other?,
             };
             fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
             coarse.coarser = None;
             fine.coarser = Some(Box::new(coarse));
             coarse = fine;
+            is_finest = tier == last;
             if coarse.relative_error <= tolerance {
                 break;
             }
         }
+        // The solver's share shrinks with the tolerance on the same panels.
+        let of_panels = coarse.relative_error - coarse.solver_error(tolerance);
+        coarse.finer_below = (!is_finest).then_some(of_panels);
         Ok(coarse)
     }
 
@@ -214,6 +224,7 @@ impl IronArray {
             relative_error: f64::NAN,
             relative_residual: solved.residual,
             iterations: solved.iterations,
+            finer_below: None,
             coarser: None,
         };
         array.add_inductances(&firsts, tolerance)?;
@@ -284,9 +295,12 @@ impl IronArray {
         let added = &self.added_inductance_h;
         let size = added.amax().max(least_h(&self.winding));
         let apart_h = (added - &other.added_inductance_h).amax() + self.flux_error_h;
-        // Both are solved to this residual, so their difference need not show it.
-        let solver = self.relative_residual.max(SOLVER_SHARE * tolerance);
-        Ok(worst.max(apart_h / size) + solver)
+        Ok(worst.max(apart_h / size) + self.solver_error(tolerance))
+    }
+
+    /// What the linear solver leaves: two solved to this residual need not show it by their difference.
+    fn solver_error(&self, tolerance: f64) -> f64 {
+        self.relative_residual.max(SOLVER_SHARE * tolerance)
     }
 
     /// Number of unknowns of one mirrored part.
@@ -499,6 +513,8 @@ pub struct IronPeaks {
     pub cores: Vec<Peak>,
     /// In the rest.
     pub elsewhere: Peak,
+    /// A tolerance below which finer panels are taken, as far as memory allows; `None` where they are not.
+    pub finer_below: Option<f64>,
 }
 
 impl IronArray {
@@ -595,6 +611,7 @@ impl IronArray {
         Ok(IronPeaks {
             elsewhere: climbed[cores],
             cores: climbed[..cores].to_vec(),
+            finer_below: self.finer_below,
         })
     }
 
