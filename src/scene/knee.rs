@@ -4,7 +4,7 @@
 pub(crate) const FOR_CORES: &str = "give core.bh_curve, or lower the current";
 
 /// Largest error of a peak, relative to it, with which it is known: beyond, panels resolve neither.
-const KNOWN: f64 = 0.3;
+const KNOWN: f64 = 0.5;
 /// What to do about a peak that is not known.
 const FINER: &str = "lower --tolerance";
 
