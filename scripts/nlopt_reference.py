@@ -4,7 +4,7 @@
     pip install -r scripts/nlopt_requirements.txt      # ngsolve only to remake the core's table
     python3 scripts/nlopt_reference.py --self-test     # the model against known numbers
     python3 scripts/nlopt_reference.py --all           # solve all problems, compare with the files
-    python3 scripts/nlopt_reference.py --subset ci     # those marked `ci`
+    python3 scripts/nlopt_reference.py --subset ci     # those marked `ci`, or `again`: fewer
     python3 scripts/nlopt_reference.py --all --write   # write the files again
     python3 scripts/nlopt_reference.py --models FILE   # compare fluxform's model, design by design
     python3 scripts/nlopt_reference.py --judge FILE    # judge fluxform's optima
@@ -120,7 +120,7 @@ def compared(arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--all", action="store_true", help="solve every problem")
-    parser.add_argument("--subset", choices=["ci"], help="solve or judge the marked problems only")
+    parser.add_argument("--subset", choices=["ci", "again"], help="solve or judge the marked problems only")
     parser.add_argument("--write", action="store_true", help="write reference.json and timing.json (with --all)")
     parser.add_argument("--bench", nargs="?", const=BENCH, type=pathlib.Path, metavar="CSV")
     parser.add_argument("--models", type=pathlib.Path, metavar="FILE")

@@ -236,11 +236,16 @@ impl SceneIron {
         for (coil, [x, y]) in design.array.positions_m.iter().enumerate() {
             let distance_m = self.distance_m([*x, *y, height_m]);
             if distance_m < reach_m {
+                let side = if distance_m < 0.0 {
+                    "inside it"
+                } else {
+                    "off its surface"
+                };
                 return Err(RunError::Input(format!(
-                    "the magnet at the target, {} mm above coil {coil}, cuts [plate] or [[iron]], whose surface is \
-                     {:.3} mm from its centre (below nothing: inside); raise target.height_mm, or move the steel",
+                    "the magnet at the target, {} mm above coil {coil}, cuts [plate] or [[iron]]: its centre is {:.3} mm \
+                     {side}; raise target.height_mm, or move the steel",
                     height_m * 1e3,
-                    distance_m * 1e3
+                    distance_m.abs() * 1e3
                 )));
             }
         }
