@@ -9,7 +9,7 @@ use super::vector_feedback::{CurrentsOf, VectorProblem, sums_at};
 /// How far the force along x and y is off the requested one, which has none unless it is along the surface's normal, at
 /// the chosen lambda, by the force of the coils; the pull of the unpowered steel counts upward only, and `pull_share` says
 /// what that leaves out. Shares are root mean squares over the points, over that of the requested force; angles are
-/// between the given force and the requested one, medians over the points above height 0.
+/// between the given force and the requested one, medians over the points above height 0 by their weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sideways {
     /// Points looked at, evenly among all; for feedback without any sideways force up to a thousand of them.

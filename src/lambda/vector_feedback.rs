@@ -14,7 +14,7 @@
 //! distance, which is convex. The lower end, above zero only where a force without currents is too strong, is
 //! found likewise from below.
 
-use fluxform_numerics::quantile::quantile;
+use fluxform_numerics::quantile::weighted_quantile;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,8 @@ pub struct VectorRendering {
     pub error_share: f64,
     /// The same of its horizontal part alone.
     pub sideways_share: f64,
-    /// Angle between the given force and the requested one, median over the points above height 0, degrees.
+    /// Angle between the given force and the requested one, median over the points above height 0 by their weights,
+    /// degrees.
     pub direction_median_deg: f64,
     /// 95 % of the angles are no larger, degrees.
     pub direction_95_deg: f64,
@@ -227,7 +228,7 @@ impl<'a> Search<'a> {
             };
         }
         let bound = self.bound(&ray);
-        let Some(most) = self.end(&ray, bound, |next, now| next < now) else {
+        let Some(most) = self.end(&ray, [bound, 0.0], |next, now| next < now) else {
             return (0.0, -height);
         };
         // Beside the cone of all forces the cuts come ever nearer to no force at all.
@@ -235,7 +236,7 @@ impl<'a> Search<'a> {
             return (0.0, 0.0);
         }
         let least = if most > 0.0 {
-            self.end(&ray, 0.0, |next, now| next > now)
+            self.end(&ray, [0.0, most], |next, now| next > now)
         } else {
             Some(0.0)
         };
@@ -279,8 +280,9 @@ impl<'a> Search<'a> {
         along.iter().zip(&best).map(|(force, i)| force * i).sum()
     }
 
-    /// The end of the lambdas that is met from `lambda` on; `None` where there is none on the `way`.
-    fn end(&mut self, ray: &Ray, from: f64, way: fn(f64, f64) -> bool) -> Option<f64> {
+    /// The end of the lambdas that is met on the `way` between two, of which the second is given if any is; `None` where
+    /// none is.
+    fn end(&mut self, ray: &Ray, [from, to]: [f64; 2], way: fn(f64, f64) -> bool) -> Option<f64> {
         let mut lambda = from;
         for _ in 0..TURNS {
             let next = match self.asked(ray, lambda) {
@@ -297,13 +299,36 @@ impl<'a> Search<'a> {
                     } else {
                         1.0 + ASTRAY
                     };
-                    let given = matches!(self.asked(ray, within * lambda), Asked::Given);
-                    return given.then_some(within * lambda);
+                    return match self.asked(ray, within * lambda) {
+                        Asked::Given => Some(within * lambda),
+                        // A plane through a force that is not the nearest cuts off too little.
+                        Asked::Crosses(_) => self.halved(ray, to, lambda),
+                    };
                 }
                 _ => break,
             }
         }
         Some(lambda)
+    }
+
+    /// The end between a lambda that is given, if any is, and one that is not.
+    fn halved(&mut self, ray: &Ray, mut given: f64, mut beyond: f64) -> Option<f64> {
+        let mut is_given = |lambda| matches!(self.asked(ray, lambda), Asked::Given);
+        if !is_given(given) {
+            return None;
+        }
+        for _ in 0..TURNS {
+            let middle = 0.5 * (given + beyond);
+            if (beyond - given).abs() <= ASTRAY * middle.abs() {
+                break;
+            }
+            *if is_given(middle) {
+                &mut given
+            } else {
+                &mut beyond
+            } = middle;
+        }
+        Some(given)
     }
 
     fn asked(&mut self, ray: &Ray, lambda: f64) -> Asked {
@@ -468,7 +493,8 @@ pub(super) struct Sums {
     largest: f64,
     /// Of the upward force.
     given: Ratios,
-    angles_deg: Vec<f64>,
+    /// With their weights.
+    angles_deg: Vec<(f64, f64)>,
 }
 
 impl Sums {
@@ -498,8 +524,8 @@ impl Sums {
             self.largest = self.largest.max(current.abs());
         }
         self.given.add(weight, force[2], request[2]);
-        if request != [0.0; 3] {
-            self.angles_deg.push(angle_deg(request, force));
+        if request != [0.0; 3] && weight > 0.0 {
+            self.angles_deg.push((angle_deg(request, force), weight));
         }
     }
 
@@ -518,10 +544,10 @@ impl Sums {
     }
 
     pub(super) fn rendering(mut self) -> VectorRendering {
-        self.angles_deg.sort_by(f64::total_cmp);
+        self.angles_deg.sort_by(|a, b| a.0.total_cmp(&b.0));
         let angle_deg = |part: f64| match &self.angles_deg[..] {
             [] => 0.0,
-            angles_deg => quantile(angles_deg, part),
+            angles_deg => weighted_quantile(angles_deg, part),
         };
         // Nothing requested: no share of it.
         let share = |square: f64| {

@@ -779,7 +779,7 @@ fn regression_a_force_vector_out_of_reach_was_called_no_force() {
     arguments.extend(["--constant", "vector", "--evaluations", "4"]);
     let run = place.run(&arguments).ends(3);
     for said in [
-        "without a sideways part for wedge",
+        "cannot render the force vector of wedge",
         "at point 0",
         "current_min_a",
     ] {

@@ -60,7 +60,7 @@ fn rows(output: &Output) -> Vec<Vec<f64>> {
 fn positions(bundle: &Bundle) -> Vec<[f64; 3]> {
     let mut random = Random::new(11);
     let map = &bundle.map;
-    (0..100)
+    (0..200)
         .map(|i| {
             [&map.x_m, &map.y_m, &map.z_m].map(|axis| {
                 let t = random.unit();

@@ -22,7 +22,7 @@ use crate::design::Need;
 /// Renders every object at its own force constant (lambda_jnd, as `lambda` reports it) and compares
 /// every two of them wherever a finger would touch either: at the points of both surfaces. With
 /// static currents each object's currents give a force at any place. With position feedback the
-/// force is lambda h(x, y), by currents of least power, the nearest force where the limits bind and
+/// force is the requested one, by currents of least power, the nearest force where the limits bind and
 /// none beside the object. A difference of two forces is stated in units of what a finger just
 /// notices: a part (--jnd) of the larger force, but at least 0.8 mN; where one object gives no force
 /// and the other a strong one it is 1/jnd, where both push against each other up to twice that. Means

@@ -121,7 +121,7 @@ struct FeedbackFlags {
     /// points can be given, and what static currents lose.
     #[arg(long)]
     feedback: bool,
-    /// With --feedback: meet the same demand as far above and below the surface, like 14mm
+    /// With --feedback: meet the same upward demand as far above and below the surface, like 14mm
     #[arg(long, hide_short_help = true, value_name = "LENGTH", requires = "feedback",
           value_parser = values::length_with_unit, allow_hyphen_values = true)]
     shell: Option<f64>,

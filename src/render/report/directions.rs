@@ -4,6 +4,7 @@ use std::io;
 
 use fluxform_bundle::replay::angle_deg;
 use fluxform_bundle::table::{Column, write_columns};
+use fluxform_numerics::quantile::quantile;
 
 use super::data::{CalibratedObject, DirectionCell, DirectionField};
 use super::frame::Section;
@@ -163,7 +164,10 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
         let angles = cells.map(|cell| error_deg(cell, given));
         let mut angles: Vec<f64> = angles.collect();
         angles.sort_by(f64::total_cmp);
-        angles.get(angles.len() / 2).copied().unwrap_or(0.0)
+        match &angles[..] {
+            [] => 0.0,
+            angles => quantile(angles, 0.5),
+        }
     };
     let [fixed, following] = GIVEN.map(|(_, given)| median(given));
     body.element(

@@ -278,7 +278,7 @@ fn nothing_rendered(
     let because = why.map_or_else(String::new, |why| format!(" ({why})"));
     match (constant, other) {
         (Constant::Other(OtherAim::Vector), _) if why.is_some() => format!(
-            "the given design renders no force without a sideways part for {shape}{because}, so there is nothing to \
+            "the given design cannot render the force vector of {shape}{because}, so there is nothing to \
              compare with: let currents flow both ways (supply.current_min_a below 0), or add coils"
         ),
         (

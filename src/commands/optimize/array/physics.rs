@@ -57,7 +57,7 @@ pub enum Constant {
 pub enum OtherAim {
     /// The largest with currents of their own at every point
     Feedback,
-    /// The same for the force vector, nothing sideways
+    /// The same for the force vector: along the normals where a shape requests that, else nothing sideways
     Vector,
     /// The least error at the force constant of --lambda, the currents the same everywhere
     Error,
@@ -156,6 +156,8 @@ pub struct ArrayPhysics<'a> {
     /// Points of every shape, while searching and in the end.
     coarse: Vec<ForcePoints>,
     fine: Vec<ForcePoints>,
+    /// The force that every shape requests.
+    requested: Vec<RequestedForce>,
     progress: &'a dyn Progress,
     /// Digest of all that decides forces and constants but the design.
     origin: String,
@@ -196,13 +198,15 @@ impl<'a> ArrayPhysics<'a> {
             )
         };
         let all: Vec<_> = coarse.iter().chain(&fine).map(places).collect();
-        let origin = format!("{BUILD} {aim:?} {tolerance:?} {all:?}");
+        let requested: Vec<_> = shapes.iter().map(|shape| shape.document.force).collect();
+        let origin = format!("{BUILD} {aim:?} {tolerance:?} {all:?} {requested:?}");
         Ok(Self {
             origin: sha256_hex(origin.as_bytes()),
             aim,
             tolerance,
             coarse,
             fine,
+            requested,
             progress,
             reported: AtomicUsize::new(0),
             known: Mutex::default(),
@@ -382,7 +386,8 @@ impl<'a> ArrayPhysics<'a> {
         for (shape, (points, problem)) in shapes.enumerate() {
             let own = vectors.map(|all| all.split_at(problem.points() * coils));
             vectors = own.map(|(_, others)| others);
-            let rendering = Rendering::new(problem, own.map(|(own, _)| own), points);
+            let directions = points.directions(self.requested[shape]);
+            let rendering = Rendering::new(problem, own.map(|(own, _)| own), directions);
             let merit = match self.merit(&rendering)? {
                 Ok(merit) if merit > 0.0 => merit,
                 Ok(_) => return Ok(Err(Unrendered { shape, why: None })),
@@ -484,18 +489,21 @@ struct Rendering<'a> {
     problem: ForceProblem<'a>,
     /// Forces along x and y, N/A; `None` of the upward force.
     sides_n_per_a: Option<[Vec<f64>; 2]>,
-    /// The requested directions; empty of the upward force.
+    /// The requested directions.
     direction: Vec<[f64; 3]>,
 }
 
 impl<'a> Rendering<'a> {
-    fn new(problem: ForceProblem<'a>, vectors: Option<&[[f64; 3]]>, points: &ForcePoints) -> Self {
-        let directions = |_| points.directions(RequestedForce::default());
+    fn new(
+        problem: ForceProblem<'a>,
+        vectors: Option<&[[f64; 3]]>,
+        direction: Vec<[f64; 3]>,
+    ) -> Self {
         Self {
             problem,
             sides_n_per_a: vectors
                 .map(|vectors| [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect())),
-            direction: vectors.map(directions).unwrap_or_default(),
+            direction,
         }
     }
 
