@@ -27,7 +27,7 @@ pub struct GivenForce {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ratios {
     /// Ratios to requests that are no larger do not count, N.
-    pub(super) least_request_n: f64,
+    least_request_n: f64,
     given: f64,
     requested: f64,
     least: f64,

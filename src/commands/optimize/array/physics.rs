@@ -386,8 +386,8 @@ impl<'a> ArrayPhysics<'a> {
         for (shape, (points, problem)) in shapes.enumerate() {
             let own = vectors.map(|all| all.split_at(problem.points() * coils));
             vectors = own.map(|(_, others)| others);
-            let directions = points.directions(self.requested[shape]);
-            let rendering = Rendering::new(problem, own.map(|(own, _)| own), directions);
+            let requested = (points, self.requested[shape]);
+            let rendering = Rendering::new(problem, own.map(|(own, _)| own), requested);
             let merit = match self.merit(&rendering)? {
                 Ok(merit) if merit > 0.0 => merit,
                 Ok(_) => return Ok(Err(Unrendered { shape, why: None })),
@@ -489,7 +489,7 @@ struct Rendering<'a> {
     problem: ForceProblem<'a>,
     /// Forces along x and y, N/A; `None` of the upward force.
     sides_n_per_a: Option<[Vec<f64>; 2]>,
-    /// The requested directions.
+    /// The requested directions; empty of the upward force.
     direction: Vec<[f64; 3]>,
 }
 
@@ -497,13 +497,14 @@ impl<'a> Rendering<'a> {
     fn new(
         problem: ForceProblem<'a>,
         vectors: Option<&[[f64; 3]]>,
-        direction: Vec<[f64; 3]>,
+        (points, requested): (&ForcePoints, RequestedForce),
     ) -> Self {
+        let directions = |_| points.directions(requested);
         Self {
             problem,
             sides_n_per_a: vectors
                 .map(|vectors| [0, 1].map(|axis| vectors.iter().map(|f| f[axis]).collect())),
-            direction,
+            direction: vectors.map(directions).unwrap_or_default(),
         }
     }
 
