@@ -233,8 +233,11 @@ pub struct FeedbackShell {
     pub floor_m: f64,
     /// Places below that, looked at there instead.
     pub clipped: usize,
-    /// Places in all.
+    /// Places in the layers.
     pub places: usize,
+    /// Places between the layers, looked at where the largest force may fall there.
+    #[serde(default)]
+    pub places_between: usize,
     /// The largest that every place can be given.
     #[serde(flatten)]
     pub largest: LargestGiven,

@@ -82,8 +82,10 @@ pub struct Decided {
     pub lambda_n_per_m: f64,
     /// Its point.
     pub point: usize,
-    /// The layer in which it lies, in the order of [`Span::add`].
+    /// The layer in which it lies, in the order in which they were added.
     pub layer: usize,
+    /// Its place among those of the layer.
+    pub place: usize,
 }
 
 /// Why no force constant above zero can be given to every point.
@@ -129,8 +131,19 @@ pub struct Span {
 impl Span {
     /// Adds a layer of places over the points whose heights are given.
     pub fn add(&mut self, height_m: &[f64], layer: &Reachable) {
+        self.add_over(height_m, layer, |place| place);
+    }
+
+    /// Adds a layer of places over some points: `point` gives that of a place.
+    pub fn add_over(
+        &mut self,
+        height_m: &[f64],
+        layer: &Reachable,
+        point: impl Fn(usize) -> usize,
+    ) {
         let ends = layer.least_n.iter().zip(&layer.most_n);
-        for (point, (&height, (&least, &most))) in height_m.iter().zip(ends).enumerate() {
+        for (place, (&height, (&least, &most))) in height_m.iter().zip(ends).enumerate() {
+            let point = point(place);
             if height == 0.0 {
                 if !(least <= 0.0 && most >= 0.0) {
                     self.unwanted.get_or_insert(point);
@@ -146,6 +159,7 @@ impl Span {
                 lambda_n_per_m,
                 point,
                 layer: self.layers,
+                place,
             };
             if self.highest.is_none_or(|h| high < h.lambda_n_per_m) {
                 self.highest = Some(at(high));
@@ -393,39 +407,4 @@ impl Sums {
             forces_n: self.forces,
         }
     }
-}
-
-/// How far a quantity known in evenly spaced layers may fall between them below its smallest
-/// value, if it bends there as it does at the layers: of the parabolas through every three
-/// neighbours, the lowest point below the smallest value of all. `layers` holds one list a layer.
-#[must_use]
-pub fn dip_between(layers: &[Vec<f64>]) -> f64 {
-    let points = layers.first().map_or(0, Vec::len);
-    let mut smallest = f64::INFINITY;
-    let mut lowest = f64::INFINITY;
-    for point in 0..points {
-        let at = |layer: usize| layers[layer][point];
-        let bend = |layer: usize| {
-            if layer >= 1 && layer + 1 < layers.len() {
-                (at(layer - 1) - 2.0 * at(layer) + at(layer + 1)).abs()
-            } else {
-                0.0
-            }
-        };
-        for layer in 0..layers.len() {
-            smallest = smallest.min(at(layer));
-        }
-        for layer in 1..layers.len() {
-            let (a, b) = (at(layer - 1), at(layer));
-            let half = 0.5 * bend(layer - 1).max(bend(layer));
-            let rest = half - (b - a).abs();
-            let dip = if rest > 0.0 {
-                rest * rest / (4.0 * half)
-            } else {
-                0.0
-            };
-            lowest = lowest.min(a.min(b) - dip);
-        }
-    }
-    (smallest - lowest).max(0.0)
 }

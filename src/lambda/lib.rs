@@ -51,6 +51,7 @@
 pub mod all_points;
 mod allocation;
 mod basis;
+pub mod between;
 mod certificate;
 mod cone;
 mod criteria;

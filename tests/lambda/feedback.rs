@@ -1,6 +1,8 @@
 //! Currents of their own at every point: what is within reach, and what it takes.
 
-use fluxform_lambda::feedback::{NoLambda, Reachable, Span, dip_between, reachable, render};
+use fluxform_lambda::ForceProblem;
+use fluxform_lambda::between::{Strongest, gaps};
+use fluxform_lambda::feedback::{NoLambda, Reachable, Span, reachable, render};
 use fluxform_lambda::worst::maxmin;
 use fluxform_numerics::real::Real;
 
@@ -344,22 +346,108 @@ fn a_force_without_currents_narrows_the_span() {
     assert!((most.lambda_n_per_m - 3.0).abs() < 1e-12 && most.layer == 2);
 }
 
-#[test]
-fn what_falls_between_layers_is_seen() {
-    let dip = |step: f64, least: f64| {
-        let layers = (-5..=5).map(|k| vec![1.3 + 0.7 * (f64::from(k) * step - least).powi(2)]);
-        dip_between(&layers.collect::<Vec<_>>())
+/// Largest lambdas along a line of places where forces are given by height, at `steps` gaps.
+fn along(
+    force: impl Fn(f64) -> [f64; 2],
+    lower: [f64; 2],
+    total: Option<f64>,
+    at_m: &[f64],
+) -> Vec<(f64, Strongest)> {
+    let strongest = |z: &f64| {
+        let row = force(*z);
+        let problem = ForceProblem {
+            forces_n_per_a: &row,
+            height_m: &[0.3],
+            offset_n: Some(&[-0.02]),
+            weights: None,
+            lower_a: &lower,
+            upper_a: &[2.0, 1.5],
+            total_max_a: total,
+            resistance_ohm: &[6.0, 6.0],
+        };
+        let most_n = reachable(&problem).unwrap().most_n[0];
+        (most_n / 0.3, Strongest::new(&problem).unwrap())
     };
-    // The parabola's own lowest point.
-    for (step, least) in [(0.1_f64, 0.03_f64), (0.1, 0.05), (0.2, 0.07)] {
-        let expected = 0.7 * least.min(step - least).powi(2);
-        assert!(
-            (dip(step, least) - expected).abs() < 1e-12,
-            "{step} {least}"
-        );
+    at_m.iter().map(strongest).collect()
+}
+
+/// A coil that changes its sign between two places makes the largest force fall like a V: parabolas
+/// through three of its values missed a tenth of it.
+#[test]
+fn what_falls_between_places_is_bounded() {
+    let straight = |z: f64| [0.4 * (z - 0.37), 0.1 + 0.05 * z];
+    let bent = |z: f64| {
+        [
+            0.4 * (z - 0.37) + 0.1 * z * z,
+            0.1 + 0.05 * z - 0.03 * z * z,
+        ]
+    };
+    let force = |bends: bool| move |z: f64| if bends { bent(z) } else { straight(z) };
+    for (bends, lower, total) in [
+        (false, [-0.5, -0.5], None),
+        (true, [-0.5, -0.5], None),
+        (true, [-2.0, 0.0], Some(2.5)),
+        (false, [0.0, 0.0], Some(1.0)),
+    ] {
+        let at_m = [0.0, 0.6, 1.0];
+        let places = along(force(bends), lower, total, &at_m);
+        let [a, b, c] = &places[..] else {
+            unreachable!()
+        };
+        let found = gaps([&a.1, &b.1, &c.1], |_| at_m);
+        assert_eq!(found.len(), 2);
+        for (gap, ends) in found.iter().zip(places.windows(2)) {
+            let [from, to] = gap.ends_m;
+            let fine: Vec<f64> = (0..=1000)
+                .map(|k| from + (to - from) * f64::from(k) / 1e3)
+                .collect();
+            let values = along(force(bends), lower, total, &fine);
+            let least = values
+                .iter()
+                .map(|value| value.0)
+                .fold(f64::INFINITY, f64::min);
+            let coarse = ends[0].0.min(ends[1].0);
+            assert!(gap.least_n_per_m <= least + 1e-12, "{gap:?} {least}");
+            // Along a straight line one change of sign is found exactly, and where it is.
+            if !bends {
+                assert!(
+                    (gap.least_n_per_m - least).abs() < 1e-3 * least,
+                    "{gap:?} {least}"
+                );
+            }
+            if !bends && lower[0] < 0.0 && gap.ends_m[0] == 0.0 {
+                assert!(
+                    coarse > 1.2 * least && (gap.lowest_m - 0.37).abs() < 1e-9,
+                    "{gap:?}"
+                );
+            }
+        }
     }
-    // Nothing falls below a slope's end, nor with fewer than three layers.
-    assert_eq!(dip(0.1, 3.0), 0.0);
-    assert_eq!(dip_between(&[vec![1.0, 0.7], vec![0.9, 1.3]]), 0.0);
-    assert_eq!(dip_between(&[]), 0.0);
+}
+
+#[test]
+fn a_point_that_wants_nothing_has_no_gaps() {
+    let mut problem = two_coils();
+    problem.height_m = &[0.0, -0.2];
+    let place = Strongest::new(&problem).unwrap();
+    let found = gaps([&place; 3], |_| [0.0, 1.0, 3.0]);
+    assert!(found.iter().all(|gap| gap.point == 1), "{found:?}");
+    // The same force everywhere, downward: both coils drive the other way.
+    let most = -reachable(&problem).unwrap().least_n[1] / 0.2;
+    for gap in &found {
+        assert!((gap.least_n_per_m - most).abs() < 1e-12 * most, "{gap:?}");
+    }
+}
+
+fn two_coils() -> ForceProblem<'static> {
+    ForceProblem {
+        forces_n_per_a: &[0.7, 0.2, 0.3, 1.1],
+        height_m: &[1.3, 0.9],
+        offset_n: None,
+        weights: None,
+        lower_a: &[-0.4, -0.1],
+        upper_a: &[1.5, 2.0],
+        total_max_a: Some(1.2),
+        resistance_ohm: &[6.0, 6.0],
+    }
 }

@@ -3,10 +3,10 @@
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::lambda_file::{
-    FeedbackFile, FeedbackPlace, FeedbackShell, LargestGiven, StaticRendering, VectorFeedbackFile,
+    FeedbackFile, FeedbackPlace, LargestGiven, StaticRendering, VectorFeedbackFile,
 };
 use crate::lambda::feedback::{
-    Decided, FeedbackError, NoLambda, Rendered, Span, dip_between, reachable, render,
+    Decided, FeedbackError, NoLambda, Rendered, Span, reachable, render,
 };
 use crate::lambda::two_fingers::{TwoFingers, two_fingers};
 use crate::lambda::vector_feedback::{
@@ -16,15 +16,10 @@ use crate::lambda::vector_static::{VectorStatic, sideways_weight, vector_static}
 use crate::lambda::{ForceProblem, OperatingPoint, Rewired};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::{finger_magnet, passive};
+use crate::scene::finger_magnet;
 use crate::units::DIRECTION_JND_DEG;
 
 use super::PosedProblem;
-
-/// Layers of a shell lie no further apart, m.
-const SPACING_M: f64 = 2e-3;
-/// Layers above the surface, at most: a shell is not a search of all space.
-const MOST_LAYERS: f64 = 500.0;
 
 /// The options of `--feedback`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -44,7 +39,7 @@ impl FeedbackOptions {
     }
 }
 
-fn floor_m(scene: &Scene, lowest_m: f64) -> f64 {
+pub(super) fn floor_m(scene: &Scene, lowest_m: f64) -> f64 {
     scene.design.workspace.z_m.from.min(lowest_m)
 }
 
@@ -85,7 +80,7 @@ impl PosedProblem<'_> {
         let shell = options.shell_m.map(|reach| self.shell(reach, progress));
         let (shell, between_layers) = shell.transpose()?.unzip();
         let file = FeedbackFile {
-            largest: largest_given(largest, |at| self.points.positions_m[at.point]),
+            largest: largest_given(largest, |at| self.points.positions_m[at.place]),
             smallest_lambda_n_per_m: span.smallest_n_per_m(),
             without: chosen.map(|chosen| self.fixed(chosen)),
             at_chosen,
@@ -111,129 +106,6 @@ impl PosedProblem<'_> {
             largest_current_a: currents.iter().fold(0.0, |most, i| most.max(i.abs())),
             power_w: currents.iter().zip(&ohm).map(|(i, ohm)| i * i * ohm).sum(),
         }
-    }
-
-    /// The force constant that can be given within `reach_m` above and below the surface.
-    fn shell(
-        &self,
-        reach_m: f64,
-        progress: &dyn Progress,
-    ) -> Result<(FeedbackShell, Option<StageAccuracy>), RunError> {
-        let layers = Layers::new(reach_m, floor_m(self.scene, self.points.lowest_m()))?;
-        let positions_m = &self.points.positions_m;
-        let height_m = self.problem.height_m;
-        // The steel's pull is solved once, for both ends of the shell.
-        let pull = if self.problem.offset_n.is_some() {
-            let ends = [
-                layers.places(0, positions_m),
-                layers.places(layers.count() - 1, positions_m),
-            ];
-            passive::pull(self.scene, &ends.concat(), false)?
-        } else {
-            None
-        };
-        let (mut all, mut every_second) = (Span::default(), Span::default());
-        let mut limits = Vec::with_capacity(layers.count());
-        for k in 0..layers.count() {
-            let places = layers.places(k, positions_m);
-            let forces = self.scene.forces_n_per_a(self.solved, &places, progress)?;
-            let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(&places));
-            let unwired = ForceProblem {
-                forces_n_per_a: &forces,
-                offset_n: offset_n.as_deref(),
-                ..self.unwired
-            };
-            let rewired = (self.options.wiring).apply(&unwired, self.scene.design.supply.voltage_v);
-            let reach = reachable(&rewired.problem(&unwired))?;
-            all.add(height_m, &reach);
-            if k % 2 == 0 {
-                every_second.add(height_m, &reach);
-            }
-            let of_height = |(most, h): (&f64, &f64)| most / h;
-            let felt = reach.most_n.iter().zip(height_m).filter(|(_, h)| **h > 0.0);
-            limits.push(felt.map(of_height).collect());
-        }
-        let largest = all.largest();
-        let coarse = every_second.largest().ok();
-        let coarse = coarse.map(|largest| largest.lambda_n_per_m);
-        let stage = largest.ok().map(|found| {
-            let lambda = found.lambda_n_per_m;
-            let missed = coarse.map_or(0.0, |coarse| coarse - lambda);
-            StageAccuracy {
-                estimate: missed.max(dip_between(&limits)) / lambda,
-                relative_to: "lambda of the shell".to_owned(),
-                method: "an estimate: what every second layer misses, or parabolas through \
-                         three neighbours fall below the layers, whichever is more"
-                    .to_owned(),
-            }
-        });
-        let shell = FeedbackShell {
-            reach_m,
-            layers: layers.count(),
-            spacing_m: reach_m / layers.steps as f64,
-            floor_m: layers.floor_m,
-            clipped: layers.clipped(&self.points.height_m),
-            places: layers.count() * height_m.len(),
-            largest: largest_given(largest, |at| layers.places(at.layer, positions_m)[at.point]),
-            smallest_lambda_n_per_m: all.smallest_n_per_m(),
-            every_second_lambda_n_per_m: coarse,
-        };
-        Ok((shell, stage))
-    }
-}
-
-/// Copies of the surface, evenly spaced above and below it.
-struct Layers {
-    reach_m: f64,
-    /// Layers above the surface, and below it.
-    steps: usize,
-    /// No place is lower, m.
-    floor_m: f64,
-}
-
-impl Layers {
-    /// # Errors
-    /// A reach beyond what a finger leaves a surface by.
-    fn new(reach_m: f64, floor_m: f64) -> Result<Self, RunError> {
-        // Two steps at a time up and down, so that every second layer holds both ends too.
-        let pairs = (reach_m / (2.0 * SPACING_M) * (1.0 - 1e-12)).ceil();
-        if pairs > 0.5 * MOST_LAYERS {
-            return Err(RunError::Input(format!(
-                "--shell {} mm is more than {} mm: no finger leaves a surface so far",
-                reach_m * 1e3,
-                MOST_LAYERS * SPACING_M * 1e3
-            )));
-        }
-        Ok(Self {
-            reach_m,
-            steps: 2 * pairs.max(1.0) as usize,
-            floor_m,
-        })
-    }
-
-    fn count(&self) -> usize {
-        2 * self.steps + 1
-    }
-
-    /// Height of a layer above the surface, m.
-    fn lift_m(&self, layer: usize) -> f64 {
-        self.reach_m * (layer as f64 / self.steps as f64 - 1.0)
-    }
-
-    fn places(&self, layer: usize, surface_m: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let lift_m = self.lift_m(layer);
-        let lifted = |p: &[f64; 3]| [p[0], p[1], (p[2] + lift_m).max(self.floor_m)];
-        surface_m.iter().map(lifted).collect()
-    }
-
-    /// Places of all layers that would be below the floor.
-    fn clipped(&self, height_m: &[f64]) -> usize {
-        let below = |layer: usize| {
-            let lift_m = self.lift_m(layer);
-            let heights = height_m.iter();
-            heights.filter(|h| **h + lift_m < self.floor_m).count()
-        };
-        (0..self.count()).map(below).sum()
     }
 }
 
@@ -306,7 +178,7 @@ impl PosedProblem<'_> {
         Ok(Some(VectorFeedbackFile {
             direction: force.direction,
             normal_force: force.along_normal(),
-            largest: largest_given(largest, |at| positions[at.point]),
+            largest: largest_given(largest, |at| positions[at.place]),
             fixed: at_chosen(CurrentsOf::Static(own.as_deref().unwrap_or_default()))?,
             static_vector: Some(self.static_vector(&problem, chosen)?),
             upward: at_chosen(CurrentsOf::Upward)?,
@@ -367,7 +239,7 @@ impl PosedProblem<'_> {
     }
 }
 
-fn largest_given(
+pub(super) fn largest_given(
     largest: Result<Decided, NoLambda>,
     position_m: impl Fn(Decided) -> [f64; 3],
 ) -> LargestGiven {

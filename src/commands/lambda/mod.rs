@@ -11,6 +11,7 @@ pub(crate) mod placement;
 mod points;
 mod points_effect;
 mod result_file;
+mod shell;
 pub(crate) mod sideways;
 mod text;
 pub(crate) mod uncertain;

@@ -303,14 +303,16 @@ fn shell_of(shell: &FeedbackShell) -> String {
             mm(shell.floor_m)
         ),
     };
+    let between = match shell.places_between {
+        0 => String::new(),
+        some => format!(" and {} between them", count(some, "place")),
+    };
+    let all = format!("all {} places", shell.places + shell.places_between);
     format!(
-        "within {} of the surface, {}: lambda {}{clipped}",
+        "within {} of the surface, {}{between}: lambda {}{clipped}",
         mm(shell.reach_m),
         count(shell.layers, "layer"),
-        largest(
-            &shell.largest,
-            &format!("all {}", count(shell.places, "place"))
-        )
+        largest(&shell.largest, &all)
     )
 }
 
