@@ -301,7 +301,7 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
         "relative to the rms force / %",
         "I / A",
         "coil 8",
-        "given - requested / mN",
+        "given - lambda h / mN",
         "requested / mN",
         "with feedback",
         "maxmin",

@@ -57,7 +57,7 @@ pub enum ErrorMap {
     Scattered {
         /// Places.
         points_mm: Vec<(f64, f64)>,
-        /// Given minus requested.
+        /// Given minus lambda h.
         errors_mn: Vec<f64>,
     },
 }
@@ -67,13 +67,13 @@ pub enum ErrorMap {
 pub struct ChosenForces {
     /// N/m.
     pub lambda_n_per_m: f64,
-    /// N.
+    /// lambda h, N.
     pub requested_n: Vec<f64>,
-    /// With static currents, N.
+    /// Upward with static currents, N.
     pub static_n: Vec<f64>,
     /// With position feedback, N; empty where it was not requested.
     pub feedback_n: Vec<f64>,
-    /// Given by static currents minus requested.
+    /// Given by static currents minus lambda h.
     pub map: ErrorMap,
 }
 
@@ -224,7 +224,7 @@ impl LambdaPlot {
         let Some(chosen) = &self.chosen else {
             return empty("no lambda is chosen: no errors");
         };
-        let title = |range: &str| format!("static: given - requested{range} / mN");
+        let title = |range: &str| format!("static: given - lambda h{range} / mN");
         let (plot, x, y, title, bar) = match &chosen.map {
             ErrorMap::Grid { x_mm, y_mm, cells } => {
                 let (x, y) = (wide(*x_mm), wide(*y_mm));
@@ -302,8 +302,8 @@ impl LambdaPlot {
         ];
         let layout = Layout::new(x, y)
             .with_title(format!("forces at {:.4} N/m", chosen.lambda_n_per_m))
-            .with_x_label("requested / mN")
-            .with_y_label("given / mN");
+            .with_x_label("lambda h / mN")
+            .with_y_label("given upward / mN");
         (plots, layout)
     }
 
@@ -405,7 +405,7 @@ mod tests {
             "linear 1.3000 N/m",
             "saturation 7.7000 N/m (not shown)",
             "relative to the rms force / %",
-            "given - requested / mN",
+            "given - lambda h / mN",
             "coil 1",
         ] {
             assert!(svg.contains(words), "{words}");

@@ -75,8 +75,9 @@ fn lead(object: &CalibratedObject) -> Html {
         (Some(lambda), Some(rms_n)) => html.element(
             "p class=\"lead\"",
             &format!(
-                "A finger at height h above the coils is to feel the force \u{3bb}h. With one set \
-                 of static currents for the whole object \u{3bb} is {}, and the force is off by {}.",
+                "A finger at height h above the coils is to feel {}. With one set of static currents for the \
+                 whole object \u{3bb} is {}, and the upward force is off from \u{3bb}h by {}.",
+                requested(object),
                 stated_lambda(file, lambda),
                 rms_error(rms_n, file.relative_rms_error)
             ),
@@ -87,6 +88,18 @@ fn lead(object: &CalibratedObject) -> Html {
         ),
     };
     html
+}
+
+/// The force that is requested at height h.
+fn requested(object: &CalibratedObject) -> String {
+    let force = object.manifest.force.as_ref();
+    match force.and_then(|force| force.normal_force) {
+        None => "the force \u{3bb}h".to_owned(),
+        Some(size) => format!(
+            "a force along the surface\u{2019}s normal: {}",
+            size.meaning().to_lowercase()
+        ),
+    }
 }
 
 /// lambda in the digits that its error leaves; five in bundles of programs that did not state it.
@@ -130,7 +143,7 @@ fn answer(object: &CalibratedObject) -> Section {
         });
         tile(&mut body, "rms error", &force(rms_n), &relative);
         let at = object.worst_place().map_or_else(String::new, |at| {
-            format!("of {} requested there", force(at.wanted_n))
+            format!("where \u{3bb}h is {}", force(at.wanted_n))
         });
         tile(&mut body, "worst error", &force(worst_n), &at);
         given(&mut body, object);

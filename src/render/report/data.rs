@@ -133,9 +133,9 @@ pub struct CoilPlan {
 pub struct WorstPlace {
     /// m.
     pub position_m: [f64; 3],
-    /// N.
+    /// lambda h, N.
     pub wanted_n: f64,
-    /// N.
+    /// Upward, N.
     pub given_n: f64,
 }
 

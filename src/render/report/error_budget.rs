@@ -324,7 +324,7 @@ pub(super) fn worst(object: &CalibratedObject) -> Option<String> {
         "too strong"
     };
     Some(format!(
-        "The force is most wrong at ({x}, {y}) mm, {z} mm high: {} instead of {}, {} {way}.",
+        "The upward force is most wrong at ({x}, {y}) mm, {z} mm high: {} where \u{3bb}h is {}, {} {way}.",
         force(at.given_n),
         force(at.wanted_n),
         force((at.given_n - at.wanted_n).abs())

@@ -21,7 +21,7 @@ struct Surface {
     columns: usize,
     /// Heights, m.
     height_m: Vec<Option<f64>>,
-    /// Given minus requested, N; empty without a force constant.
+    /// Upward force minus lambda h, N; empty without a force constant.
     error_n: Vec<Option<f64>>,
 }
 
@@ -146,7 +146,7 @@ pub(super) fn section(
             &mut body,
             "errors",
             "Map of the force error over the surface, seen from above",
-            "Force given by the static currents minus the requested force, seen from above. Red: too \
+            "Upward force of the static currents minus \u{3bb}h, seen from above. Red: too \
              strong; blue: too weak; the line is where it is right.",
         );
         data.insert("errors".to_owned(), json!(true));
@@ -191,7 +191,7 @@ fn shares(object: &CalibratedObject) -> Option<Table> {
     ]);
     Some(Table {
         caption: "Force error over the points, as numbers".to_owned(),
-        head: vec![("part of the points", false), ("given - requested", true)],
+        head: vec![("part of the points", false), ("given - \u{3bb}h", true)],
         rows,
         prose: false,
     })
