@@ -25,6 +25,8 @@ pub const SAFETY: f64 = 1.25;
 /// decide, and the highest because its stencil is one-sided.
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
+/// Of an axis with so many nodes at most, quarters of cells are looked at too.
+const FEW: usize = 5;
 
 /// Direct values of one or more components of the gradient of coils on a grid, each [coil, z, y, x].
 pub type Direct<'a> = &'a dyn Fn(&[PlacedCoil], &Grid) -> Result<Vec<Vec<f64>>, MapError>;
@@ -48,7 +50,7 @@ pub fn interpolation_error(
     Ok(found[0])
 }
 
-/// The middles of cells, faces and edges in the layers that decide.
+/// The middles of cells, faces and edges in the layers that decide; of a few cells their quarters too.
 fn staggered(grid: &Grid) -> [Grid; 7] {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let middles = |nodes: &[f64]| -> Vec<f64> {
@@ -59,6 +61,18 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
             .windows(2)
             .map(|pair| 0.5 * (pair[0] + pair[1]))
             .collect()
+    };
+    // A sideways component is zero in the middle of a cell that lies evenly about an axis; of many cells others show
+    // the error.
+    let inside = |nodes: &[f64]| -> Vec<f64> {
+        if nodes.len() > FEW {
+            return middles(nodes);
+        }
+        let quarters = |pair: &[f64]| [0.25, 0.5, 0.75].map(|t| pair[0] + t * (pair[1] - pair[0]));
+        match nodes {
+            [_] => nodes.to_vec(),
+            _ => nodes.windows(2).flat_map(quarters).collect(),
+        }
     };
     let layers = |heights: Vec<f64>| -> Vec<f64> {
         let top = heights.len().saturating_sub(HIGHEST);
@@ -71,13 +85,13 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
             .collect()
     };
     [
-        (middles(x), middles(y), middles(z)),
+        (inside(x), inside(y), middles(z)),
         // Where the errors along two axes have the sign that the third's has not.
-        (x.clone(), middles(y), middles(z)),
-        (middles(x), y.clone(), middles(z)),
-        (middles(x), middles(y), z.clone()),
-        (middles(x), y.clone(), z.clone()),
-        (x.clone(), middles(y), z.clone()),
+        (x.clone(), inside(y), middles(z)),
+        (inside(x), y.clone(), middles(z)),
+        (inside(x), inside(y), z.clone()),
+        (inside(x), y.clone(), z.clone()),
+        (x.clone(), inside(y), z.clone()),
         (x.clone(), y.clone(), middles(z)),
     ]
     .map(|(x_m, y_m, z_m)| Grid {

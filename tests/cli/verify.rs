@@ -251,6 +251,33 @@ fn a_low_map_of_slender_coils_verifies() {
     place.run(&["verify", "results/slender/low"]).ends(0);
 }
 
+/// Regression: errors between nodes were held against the largest value on nodes, which lie beside these coils' axes;
+/// and none was stated of a sideways component that is zero in the middle of the only cell.
+#[test]
+fn maps_whose_nodes_lie_beside_the_coils_verify() {
+    for (nodes, force) in [(6, "vertical"), (2, "vertical"), (2, "normal")] {
+        let place = Place::new();
+        place.write(
+            "two.toml",
+            &format!(
+                "name = \"two\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\nlength_mm = 100.0\n\
+                 turns = 1429\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\npitch_mm = 50\n[supply]\n\
+                 current_max_a = [5, 4]\n[workspace]\nx_mm = [-50, 50, 31]\ny_mm = [-50, 50, {nodes}]\n\
+                 z_mm = [20, 45, 6]\n"
+            ),
+        );
+        place.write(
+            "low.toml",
+            &format!(
+                "name = \"low\"\nprimitive = \"half-sphere\"\nradius_mm = 18\nbase_mm = 20\nforce = \"{force}\"\n\
+                 [points]\nx_mm = [-25, 25, 9]\ny_mm = [-25, 25, 7]\n"
+            ),
+        );
+        place.run(&["calibrate", "two.toml", "low.toml"]).ends(0);
+        place.run(&["verify", "results/two/low"]).ends(0);
+    }
+}
+
 #[test]
 fn fresh_bundles_verify_whatever_was_requested() {
     for (name, [core, array, magnet, supply], args, code) in CASES {

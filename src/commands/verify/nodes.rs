@@ -60,6 +60,36 @@ fn largest_gradients(bundle: &Bundle, route: &Route) -> Result<Vec<f64>, RunErro
         .collect())
 }
 
+/// |dB_x/dz|, dB_y/dz and dB_z/dz at each height of the map, T/m/A, near where those of a coil are largest: nodes may
+/// lie on both sides of its axis and all be smaller.
+fn peaks_between(bundle: &Bundle, route: &Route) -> Result<Vec<[f64; 3]>, RunError> {
+    /// Above a dipole the sideways components are largest so far beside its axis, over the height above it.
+    const ASIDE: f64 = 0.4;
+    let map = &bundle.map;
+    let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
+    let plan = [ends(&map.x_m), ends(&map.y_m)];
+    let off_middle_m = |coil: &usize| {
+        let axis_m = route.scene.coils[*coil].axis_m;
+        let off = |axis: usize| axis_m[axis] - 0.5 * (plan[axis][0] + plan[axis][1]);
+        off(0).hypot(off(1))
+    };
+    let coils = map.coil.iter().map(|coil| *coil as usize);
+    let Some(coil) = coils.min_by(|a, b| off_middle_m(a).total_cmp(&off_middle_m(b))) else {
+        return Ok(vec![[0.0; 3]; map.z_m.len()]);
+    };
+    let [x, y] = route.scene.coils[coil].axis_m;
+    let within = |at: f64, axis: usize| at.clamp(plan[axis][0], plan[axis][1]);
+    let of_level = |z: &f64| {
+        let aside = ASIDE * z.abs();
+        [(x + aside, y), (x, y + aside), (x, y)]
+            .map(|(x, y)| (coil, [within(x, 0), within(y, 1), *z]))
+    };
+    let places: Vec<(usize, [f64; 3])> = map.z_m.iter().flat_map(of_level).collect();
+    let found = route.gradients(&places)?;
+    let largest = |of: &[[f64; 3]]| [0, 1, 2].map(|part: usize| of[part][part].abs());
+    Ok(found.chunks(3).map(largest).collect())
+}
+
 /// Sampled nodes.
 pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<Check>, RunError> {
     let map = &bundle.map;
@@ -127,10 +157,16 @@ pub(super) fn between(
         .map(|(_, place, point)| (map.coil[*place] as usize, *point))
         .collect();
     let exact = route.gradients(&requested)?;
+    let peaks = peaks_between(bundle, route)?;
     let checks = held(bundle).into_iter().map(|([_, name], part, values)| {
-        let sizes: Vec<f64> = (0..nz)
-            .map(|level| largest_in_plane(bundle, values, level))
+        let on_nodes = (0..nz).map(|level| largest_in_plane(bundle, values, level));
+        let mut sizes: Vec<f64> = on_nodes
+            .zip(&peaks)
+            .map(|(on_nodes, peak)| on_nodes.max(peak[part]))
             .collect();
+        for ((k, _, _), exact) in places.iter().zip(&exact) {
+            sizes[*k] = sizes[*k].max(exact[part].abs());
+        }
         let worst = places
             .iter()
             .zip(&exact)
