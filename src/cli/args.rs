@@ -77,9 +77,9 @@ pub enum Colour {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Tolerance {
     /// Allowed error relative to |grad B| at the point (maps and steel: to the largest |grad B| at
-    /// that height), 1e-15 to 1e-1 [default: in air 1e-12, its maps 1e-9; one coil with a steel
-    /// core 1e-6, along its B-H curve 1e-4; arrays with coupled cores 1e-4,
-    /// with other steel 1e-2]
+    /// that height), 1e-15 to 1e-1 [default: in air 1e-12, its maps 1e-9, inductances between coils 1e-4; one
+    /// coil with a steel core 1e-6, along its B-H curve 1e-4; arrays with coupled cores 1e-4, with
+    /// other steel 1e-2]
     #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
 }

@@ -31,7 +31,7 @@ pub fn target(text: &str) -> Result<ExplainTarget, String> {
     if codes.is_empty() {
         let names: Vec<&str> = Code::ALL.iter().map(|code| code.name()).collect();
         return Err(format!(
-            "expected list, an exit code or one of {}",
+            "expected list, the exit code of a failure or one of {}",
             names.join(", ")
         ));
     }

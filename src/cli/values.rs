@@ -294,15 +294,15 @@ pub fn error(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A just-noticeable difference: a part of the force greater than zero.
+/// A just-noticeable difference: a part of the force, greater than zero.
 pub fn jnd(text: &str) -> Result<f64, String> {
     let value = part(text)?;
-    if value > 0.0 {
+    if value > 0.0 && value <= 1.0 {
         Ok(value)
     } else {
         Err(format!(
-            "invalid just-noticeable difference {value}: expected a part of the force greater than \
-             0, like 7% or 0.07"
+            "invalid just-noticeable difference {value}: expected a part of the force above 0, at most \
+             1, like 7% or 0.07"
         ))
     }
 }

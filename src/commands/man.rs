@@ -1,10 +1,12 @@
 //! `man`: the manual pages.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::{Args, CommandFactory};
 use clap_mangen::Man as Page;
+use serde::Serialize;
 
 use super::Arguments;
 use crate::RunError;
@@ -12,7 +14,7 @@ use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::printer::{Printer, say, shows_output};
+use crate::cli::printer::{Printer, Stream, shows_output};
 use crate::cli::quantity::count;
 use crate::cli::start::folder;
 use crate::cli::values::FileArgument;
@@ -32,6 +34,13 @@ pub struct Man {
     out: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
+}
+
+/// What was written.
+#[derive(Debug, Serialize)]
+struct Written {
+    folder: PathBuf,
+    pages: Vec<String>,
 }
 
 impl Man {
@@ -59,11 +68,17 @@ impl Man {
                 .map_err(RunError::from)?;
         }
         set.commit().map_err(RunError::from)?;
-        if !printer.quiet() && !printer.json() {
-            let pages = count(pages.len(), "page");
-            say(&format!("{}: {pages}", folder.display()));
-        }
-        Ok(())
+        let written = Written {
+            folder,
+            pages: pages.into_iter().map(|(name, _)| name).collect(),
+        };
+        printer.summary(Stream::Output, &written, || {
+            format!(
+                "{}: {}\n",
+                written.folder.display(),
+                count(written.pages.len(), "page")
+            )
+        })
     }
 }
 

@@ -62,7 +62,7 @@ struct Arguments {
     /// Options of every command.
     #[command(flatten)]
     common: Common,
-    /// Explain an error code, like E301, or an exit code; `list` names all of them
+    /// Explain an error code, like E301, or the exit code of a failure; `list` names all of them
     #[arg(long, value_name = "CODE", value_parser = explain::target)]
     explain: Option<explain::ExplainTarget>,
     /// The command.

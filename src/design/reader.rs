@@ -82,9 +82,12 @@ pub fn read_document<T>(
         all_keys: Some(all_keys),
         ..Sink::default()
     };
-    errors
-        .iter()
-        .for_each(|error| sink.add(syntax_fault(error, text)));
+    match other_notation(text) {
+        Some(fault) => sink.add(fault),
+        None => errors
+            .iter()
+            .for_each(|error| sink.add(syntax_fault(error, text))),
+    }
     let mut value = None;
     if !sink.has_errors() {
         let mut root = Section::root(table.get_ref(), &sink);
@@ -128,6 +131,27 @@ fn parsed(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
         };
     }
     DeTable::parse_recoverable(text)
+}
+
+/// The fault of a text of another kind, whose every line would be one.
+fn other_notation(text: &str) -> Option<Fault> {
+    let written = text.trim_start();
+    let first = written.chars().next()?;
+    let kind = match first {
+        '{' => "this is JSON",
+        '<' => "this is XML",
+        _ => {
+            let like_toml = |line: &str| line.contains('=') || line.starts_with(['[', '#']);
+            if text.lines().map(str::trim).any(like_toml) {
+                return None;
+            }
+            "no line of it gives a key a value"
+        }
+    };
+    let start = text.len() - written.len();
+    let fault =
+        Fault::error("", format!("not a TOML file: {kind}")).at(&(start..start + first.len_utf8()));
+    Some(fault.help("sections and keys look like [coil] and length_mm = 40.0"))
 }
 
 fn syntax_fault(error: &toml::de::Error, text: &str) -> Fault {

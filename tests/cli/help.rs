@@ -186,7 +186,11 @@ fn completions_and_manual_pages() {
         .run(&["man", "--out", "man1"])
         .ends(4)
         .says(&["exists", "--force"]);
-    place.run(&["man", "--out", "man1", "--force"]).ends(0);
+    let written = place
+        .run(&["man", "--out", "man1", "--force", "--format", "json"])
+        .ends(0);
+    let written: serde_json::Value = serde_json::from_str(&written.out).unwrap();
+    assert_eq!(written["pages"][0], "fluxform.1", "{written}");
 }
 
 /// The arguments that `arg` requires. clap has no way to ask for them but its description of an argument.

@@ -139,7 +139,8 @@ fn arguments_are_validated_with_their_meaning() {
     };
     lambda(&["--tolerance", "3"]).says(&["relative to the field gradient", "1e-15 to 1e-1"]);
     lambda(&["--tolerance", "-1e-9"]).says(&["invalid tolerance -1e-9"]);
-    lambda(&["--jnd", "0"]).says(&["greater than 0"]);
+    lambda(&["--jnd", "0"]).says(&["above 0, at most 1"]);
+    lambda(&["--jnd", "7"]).says(&["at most 1, like 7% or 0.07"]);
     lambda(&["--at", "-2"]).says(&["invalid force constant -2"]);
     // Its squares are no doubles: the result could not be written.
     lambda(&["--at", "1e308"]).says(&["invalid force constant 1e308", "0 to 1000000 N/m"]);

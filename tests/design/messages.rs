@@ -27,6 +27,22 @@ fn text_that_is_not_toml_is_placed() {
     assert_eq!(said, ["d.toml:2:1: error: not valid TOML: duplicate key"]);
 }
 
+/// Every line of them was a fault of its own.
+#[test]
+fn a_file_of_another_kind_is_one_fault() {
+    for (text, kind) in [
+        ("{\n  \"name\": \"a\",\n  \"turns\": 3\n}\n", "this is JSON"),
+        ("\n<?xml version=\"1.0\"?>\n<a b=\"c\"/>\n", "this is XML"),
+        ("x_m,y_m\n1,2\n3,4\n", "no line of it gives a key a value"),
+    ] {
+        let said = refused(text, Need::EVALUATE);
+        let [said] = &said[..] else {
+            panic!("{said:?}")
+        };
+        assert!(said.contains(&format!("not a TOML file: {kind}")), "{said}");
+    }
+}
+
 #[test]
 fn an_unknown_key_names_the_nearest() {
     says(&[

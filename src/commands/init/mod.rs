@@ -173,7 +173,8 @@ pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     let text = text_of(&template, &settings)?;
     let (design, _) = Design::from_toml(&text, source, Need::CALIBRATE).map_err(Refusal::Design)?;
     let head = format!(
-        "A design: {}. Lengths are in mm.\nA key behind a # is not set; what it shows holds without it.",
+        "A design: {}. Lengths are in mm.\nA key behind a # is not set; what it shows holds without it.\n\
+         A section behind a # is left out, with what it would add.",
         request.start.meaning()
     );
     let values = Template::new(&text, source)
