@@ -88,6 +88,12 @@ impl Design {
         self.plate.is_some() || !self.iron.is_empty()
     }
 
+    /// Whether there is any steel.
+    #[must_use]
+    pub fn has_steel(&self) -> bool {
+        self.core.is_some() || self.has_iron()
+    }
+
     /// The same with its cores as the only steel.
     #[must_use]
     pub fn without_iron(&self) -> Self {

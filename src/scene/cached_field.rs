@@ -102,7 +102,7 @@ impl FieldStore {
     pub fn new(scene: &Scene, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
-        let store = if design.core.is_some() || design.has_iron() {
+        let store = if design.has_steel() {
             store
         } else {
             Store::none()

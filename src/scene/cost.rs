@@ -285,7 +285,7 @@ pub enum OfDesigns<'a> {
 #[must_use]
 pub fn of_designs(design: &Design, what: OfDesigns, designs: u64, tolerance: Option<f64>) -> Cost {
     let count = designs as f64;
-    let law = match (what, design.core.is_some() || design.has_iron()) {
+    let law = match (what, design.has_steel()) {
         (OfDesigns::Evaluated, false) => EVALUATED,
         (OfDesigns::Evaluated, true) => EVALUATED_CORES,
         (OfDesigns::Searched, false) => SEARCHED,

@@ -292,7 +292,7 @@ impl SceneIron {
             &finer,
         );
         let plate = above_knee_or(
-            [known(&peaks.elsewhere)],
+            peaks.elsewhere.iter().map(known),
             self.knee_t,
             &format!("the plate or [[iron]] at {at}"),
             THICKER,

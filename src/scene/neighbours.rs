@@ -48,10 +48,10 @@ pub struct ArraySummary {
 /// A plate and other bodies of steel, with all coils at their rated currents.
 #[derive(Debug, Clone, Serialize)]
 pub struct IronSummary {
-    /// Largest |B| in them, well inside the surface, T.
-    pub peak_field_t: f64,
+    /// Largest |B| in them, well inside the surface, T; null where their permeability is that of air.
+    pub peak_field_t: Option<f64>,
     /// Where, m.
-    pub peak_at_m: [f64; 3],
+    pub peak_at_m: Option<[f64; 3]>,
     /// Flux density above which their steel is no longer linear, T.
     pub knee_t: f64,
     /// [`ArraySummary::settling_s`].
@@ -86,8 +86,8 @@ fn iron_summary(
         force_n
     });
     Ok(Some(IronSummary {
-        peak_field_t: peaks.elsewhere.field_t,
-        peak_at_m: peaks.elsewhere.place_m,
+        peak_field_t: peaks.elsewhere.map(|peak| peak.field_t),
+        peak_at_m: peaks.elsewhere.map(|peak| peak.place_m),
         knee_t: iron.knee_t,
         settling_s,
         passive_force_n,
@@ -112,7 +112,7 @@ fn iron_pull(scene: &Scene) -> Result<Option<(f64, StageAccuracy)>, RunError> {
 
 /// How sure the largest flux densities are: the worst of cores, plate and bodies.
 fn iron_accuracy(peaks: &IronPeaks) -> Option<StageAccuracy> {
-    let all = peaks.cores.iter().chain([&peaks.elsewhere]);
+    let all = peaks.cores.iter().chain(&peaks.elsewhere);
     let relative = all.filter_map(|peak| Some(peak.error_t? / peak.field_t));
     Some(StageAccuracy {
         estimate: relative.reduce(f64::max)?,

@@ -580,3 +580,24 @@ fn coupled_cores_above_the_knee_have_the_gradient_of_the_curve() {
         "coupled cores are taken as linear",
     ]);
 }
+
+/// Its largest |B| was 0 T at the origin.
+#[test]
+fn a_body_of_the_permeability_of_air_has_no_largest_field() {
+    let place = Place::new();
+    let text = String::from_utf8(place.read("designs/seed_air.toml")).unwrap();
+    let plate =
+        "[plate]\nthickness_mm = 4.0\nx_mm = 70.0\ny_mm = 40.0\nrelative_permeability = 1.0\n";
+    place.write("design.toml", &format!("{text}\n{plate}"));
+    let result = place.run(&["evaluate", "design.toml", "--format", "json"]);
+    let result = result.ends(0).json();
+    assert!(
+        result["array"]["iron"]["peak_field_t"].is_null(),
+        "{result}"
+    );
+    let shown = place.run(&["evaluate", "design.toml"]).ends(0).out;
+    assert!(
+        shown.contains("not magnetised: relative_permeability = 1"),
+        "{shown}"
+    );
+}

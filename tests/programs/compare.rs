@@ -7,6 +7,7 @@ use fluxform::commands::compare::{CompareOptions, CompareReport, Pair, run};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::ShapeSource;
+use fluxform::scene::{Scene, passive, steel};
 use fluxform::shape::document::ShapeDocument;
 use fluxform_testing::needs::Trial;
 use fluxform_testing::place::Place;
@@ -212,11 +213,13 @@ fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
 fn the_unpowered_steel_pulls_on_both_alike() {
     let text = std::fs::read_to_string(root().join("designs/seed.toml")).unwrap();
     let text = text.replace("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
-    let of = |passive: bool| {
+    let design = |passive: bool| {
         let text = text.replace("[magnet]", &format!("[magnet]\npassive_force = {passive}"));
-        let design = Design::from_toml(&text, Path::new("d.toml"), Need::LAMBDA)
-            .unwrap()
-            .0;
+        let design = Design::from_toml(&text, Path::new("d.toml"), Need::LAMBDA);
+        design.unwrap().0
+    };
+    let of = |passive: bool| {
+        let design = design(passive);
         let options = CompareOptions {
             lambda_n_per_m: Some(0.7),
             ..OWN
@@ -229,6 +232,32 @@ fn the_unpowered_steel_pulls_on_both_alike() {
     assert!((felt(&with) / felt(&without) - 1.0).abs() < 1e-9);
     let fixed = |file: &CompareReport| file.pairs[0].static_rms_jnd.unwrap();
     assert!((fixed(&with) / fixed(&without) - 1.0).abs() > 1e-4);
+    // Beside what the currents give it is pulled sideways too, which was left out.
+    let design = design(true);
+    let scene = Scene::new(&design).unwrap();
+    let place = with.pairs[0].static_at.as_ref().unwrap();
+    let at_m = [[place.x_m, place.y_m, place.z_m]];
+    let solved = steel::solve(&scene, scene.tolerances.forces, at_m[0][2]).unwrap();
+    let per_ampere = scene
+        .force_vectors_n_per_a(&solved, &at_m, &Silent)
+        .unwrap();
+    let pull_n = passive::pull(&scene, &at_m, false)
+        .unwrap()
+        .unwrap()
+        .force_n(at_m[0]);
+    assert!(pull_n[0].hypot(pull_n[1]) > 1e-4, "{pull_n:?}");
+    let currents_a = with.shapes[0].currents_a.as_ref().unwrap();
+    for axis in 0..3 {
+        let given = per_ampere
+            .iter()
+            .zip(currents_a)
+            .map(|(force, i)| force[axis] * i);
+        let expected = given.sum::<f64>() + pull_n[axis];
+        assert!(
+            (place.a_vector_n[axis] - expected).abs() < 1e-6,
+            "{axis} {expected} {place:?}"
+        );
+    }
 }
 
 fn where_nothing_can_be_rendered_nothing_is_compared() {

@@ -95,8 +95,9 @@ pub struct IronRow {
     pub inductance_h: f64,
     /// Five time constants of the slowest pattern of currents, or a current loop's time for it.
     pub settling_s: f64,
-    /// Largest |B| in the plate and other bodies with all coils at their rated currents.
-    pub peak_field_t: f64,
+    /// Largest |B| in the plate and other bodies with all coils at their rated currents; null where their permeability
+    /// is that of air.
+    pub peak_field_t: Option<f64>,
 }
 
 /// The array that renders the shapes best within a design's limits.

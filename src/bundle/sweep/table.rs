@@ -52,7 +52,7 @@ macro_rules! of_array {
 
 macro_rules! of_iron {
     ($name:literal, $iron:ident => $value:expr) => {
-        of_row!($name, Number, row => row.iron.as_ref().map(|$iron| $value))
+        of_row!($name, Number, row => row.iron.as_ref().and_then(|$iron| $value))
     };
 }
 
@@ -103,8 +103,8 @@ pub static ARRAY_COLUMNS: &[Column] = &[
 
 /// Columns after those of a sweep of designs with a plate or other steel beyond the cores.
 pub static IRON_COLUMNS: &[Column] = &[
-    of_iron!("array_inductance_h", iron => iron.inductance_h),
-    of_iron!("array_settling_s", iron => iron.settling_s),
+    of_iron!("array_inductance_h", iron => Some(iron.inductance_h)),
+    of_iron!("array_settling_s", iron => Some(iron.settling_s)),
     of_iron!("iron_peak_field_t", iron => iron.peak_field_t),
 ];
 

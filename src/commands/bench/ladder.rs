@@ -42,17 +42,12 @@ pub struct Seconds {
     pub steel_s: f64,
     /// Sampling the surface.
     pub points_s: f64,
-    /// Forces and force constants.
+    /// Forces and force constants, and the largest |B| of steel.
     pub lambda_s: f64,
+    /// Of that the forces.
+    pub forces_s: f64,
     /// The map.
     pub map_s: f64,
-}
-
-impl Seconds {
-    /// All together.
-    pub fn total_s(&self) -> f64 {
-        self.steel_s + self.points_s + self.lambda_s + self.map_s
-    }
 }
 
 /// One object at the present settings: what it takes, and its points.
@@ -221,8 +216,9 @@ impl Ladders {
             / self.points_present.len().max(1) as f64;
         let per_tolerance = one(self.seconds.steel_s) + of_points(self.seconds.lambda_s) + maps;
         let reference = REFINED_STEEL * self.seconds.steel_s
-            + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.lambda_s)
-            + places * self.seconds.lambda_s;
+            + finest * (self.seconds.points_s + REFINED_FORCES * self.seconds.forces_s)
+            + REFINED_FORCES * places * self.seconds.forces_s
+            + self.seconds.lambda_s;
         let cpu_s =
             reference + of_points(self.seconds.points_s) + tolerances as f64 * per_tolerance;
         let computations =

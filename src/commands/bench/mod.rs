@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use self::clock::Effort;
-use self::ladder::{Ladders, Seconds};
+use self::ladder::Ladders;
 use self::reference::{Places, refine};
 use self::stages::Bench;
 use super::discretize::with_surface;
@@ -207,17 +207,11 @@ fn measure_shape(
                 points.iter().zip(&lambdas).enumerate()
             {
                 let settings = vec![t as u64, p as u64, n as u64];
-                let seconds = Seconds {
-                    steel_s,
-                    points_s: *points_s,
-                    lambda_s: *lambda_s,
-                    map_s,
-                };
                 let felt_error = felt_error(&refined.places, &map, lambda)?;
                 let constant = lambda.lambda_n_per_m.filter(|lambda| *lambda > 0.0);
                 runs.push(Run {
                     settings,
-                    cpu_s: seconds.total_s(),
+                    cpu_s: steel_s + points_s + lambda_s + map_s,
                     steel_s,
                     points_s: *points_s,
                     lambda_s: *lambda_s,
@@ -326,20 +320,14 @@ fn left_out(scene: &Scene, request: &BenchRequest) -> Vec<LeftOutKnob> {
         "no knob of error against time: all force constants are read off one path and take the same \
          time; their errors at the present settings are listed by force constant",
     )];
-    all.push(match &scene.core {
-        None => one(
-            "steel resolution",
-            "the design has no [core]: the tolerance is that of the windings' field alone",
-        ),
-        Some(_) if coupled(scene.design) => one(
-            "steel resolution",
-            "not a knob of its own: panels and the exchange between the cores follow from --tolerance",
-        ),
-        Some(_) => one(
-            "steel resolution",
-            "not a knob of its own: the panels follow from --tolerance",
-        ),
-    });
+    let steel = if !scene.design.has_steel() {
+        "the design has no steel: the tolerance is that of the windings' field alone"
+    } else if coupled(scene.design) {
+        "not a knob of its own: panels and the exchange between the cores follow from --tolerance"
+    } else {
+        "not a knob of its own: the panels follow from --tolerance"
+    };
+    all.push(one("steel resolution", steel));
     all.push(match scene.design.magnet.model {
         MagnetModel::Dipole => one("dipoles of the magnet", "the magnet is one dipole"),
         MagnetModel::Cylinder => one(
@@ -358,6 +346,14 @@ fn left_out(scene: &Scene, request: &BenchRequest) -> Vec<LeftOutKnob> {
             "the points are those of a grid; with --max-deviation points graded to it are swept",
         )
     });
+    let is_vector = |shape: &ShapeSource| shape.document.force.direction.is_vector();
+    if request.shapes.iter().any(is_vector) {
+        all.push(one(
+            "sideways force",
+            "the upward force of the static currents is compared, and its map timed; of a shape that requests a \
+             force vector a bundle maps all three components",
+        ));
+    }
     all
 }
 
@@ -382,4 +378,45 @@ fn accuracy(shapes: &[ShapeBench]) -> BTreeMap<String, StageAccuracy> {
             stage(largest(|run| run.felt_error), "the force to be felt"),
         ),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::reference::refined_tolerance;
+    use super::*;
+    use crate::design::Need;
+
+    /// A plate without cores was taken for air: its field was refined to 1e-12, which panels do not reach.
+    #[test]
+    fn a_plate_without_cores_is_steel() {
+        let plate = "[plate]\nx_mm = 60.0\ny_mm = 50.0\nthickness_mm = 5.0\ngap_mm = 3.0\n";
+        for (steel, said) in [("", "no steel"), (plate, "follow from --tolerance")] {
+            let text = format!(
+                "name = \"one\"\n[coil]\ninner_diameter_mm = 7.0\nouter_diameter_mm = 13.0\nlength_mm = 17.0\n\
+                 [wire]\ndiameter_mm = 0.7\n[supply]\ncurrent_max_a = 2.0\n{steel}"
+            );
+            let (design, _) =
+                Design::from_toml(&text, Path::new("one.toml"), Need::EVALUATE).unwrap();
+            let scene = Scene::new(&design).unwrap();
+            let request = BenchRequest {
+                design: &design,
+                inputs: Vec::new(),
+                shapes: &[],
+                lambda: LambdaOptions::default(),
+                max_deviation_m: None,
+                quick: true,
+                out: PathBuf::new(),
+                force: false,
+            };
+            let left_out = left_out(&scene, &request);
+            let of_steel = left_out.iter().find(|knob| knob.knob == "steel resolution");
+            let why = &of_steel.unwrap().why;
+            assert!(why.contains(said), "{why}");
+            let tolerance = refined_tolerance(!design.has_steel(), scene.tolerances.map);
+            let reached = if steel.is_empty() { 1e-12 } else { 1e-3 };
+            assert!((tolerance / reached - 1.0).abs() < 1e-9, "{tolerance:e}");
+        }
+    }
 }

@@ -196,6 +196,15 @@ fn chosen(solution: &Solution) -> Option<(f64, &[f64])> {
     Some(chosen).filter(|(lambda, _)| *lambda > 0.0)
 }
 
+/// The tolerance of the refined field beside the tightest of the sweep.
+pub(super) fn refined_tolerance(in_air: bool, tightest: f64) -> f64 {
+    if in_air {
+        KERNEL_ERROR.min((FINER * tightest).max(FINEST_AIR))
+    } else {
+        (FINER * tightest).max(TIGHTEST_STEEL.min(tightest))
+    }
+}
+
 /// Computes it.
 ///
 /// # Errors
@@ -204,13 +213,8 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     let watch = Watch::start();
     let scene = bench.scene;
     let tightest = scene.tolerances.map;
-    let in_air = scene.core.is_none();
-    let tolerance = if in_air {
-        KERNEL_ERROR.min((FINER * tightest).max(FINEST_AIR))
-    } else {
-        (FINER * tightest).max(TIGHTEST_STEEL.min(tightest))
-    };
-    let fields = Fields::new(bench, tolerance)?;
+    let in_air = !scene.design.has_steel();
+    let fields = Fields::new(bench, refined_tolerance(in_air, tightest))?;
     let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
     let forces = fields.forces(bench, &points.positions_m)?;
     let pull = passive::counted(scene, &points.positions_m)?;

@@ -226,14 +226,15 @@ impl<'a> Bench<'a> {
     pub fn present(&self, (report, points_s): (PointsReport, f64)) -> Result<Present, RunError> {
         let grid = report.discretized.points.clone();
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
-        let (_, lambda_s) = self.lambda(
-            &solved,
-            &ForcePoints::of_object(
-                &report,
-                self.request.lambda.weights_of(&report),
-                &self.scene.design.workspace,
-            ),
-        )?;
+        let points = ForcePoints::of_object(
+            &report,
+            self.request.lambda.weights_of(&report),
+            &self.scene.design.workspace,
+        );
+        let (_, lambda_s) = self.lambda(&solved, &points)?;
+        let at_points =
+            || (self.scene).forces_n_per_a(&solved.forces, &points.positions_m, &self.within());
+        let (_, forces) = measure(&self.effort, at_points)?;
         let samples = present_samples(self.scene.design);
         let (_, map_s) = self.map(&solved, &grid, samples)?;
         Ok(Present {
@@ -241,6 +242,7 @@ impl<'a> Bench<'a> {
                 steel_s,
                 points_s,
                 lambda_s,
+                forces_s: forces.seconds,
                 map_s,
             },
             grid,

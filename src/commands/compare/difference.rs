@@ -27,9 +27,9 @@ pub struct Felt {
 impl Felt {
     /// The force of `currents_a` for forces per ampere `row`, and without any current.
     #[must_use]
-    pub fn of(row: &[[f64; 3]], currents_a: &[f64], passive_n: f64) -> Self {
+    pub fn of(row: &[[f64; 3]], currents_a: &[f64], passive_n: [f64; 3]) -> Self {
         let mut felt = Self {
-            force_n: [0.0, 0.0, passive_n],
+            force_n: passive_n,
             gross_n: [0.0; 3],
         };
         for (per_ampere, current) in row.iter().zip(currents_a) {
@@ -140,7 +140,7 @@ mod tests {
     fn felt(forces: &[f64]) -> Vec<Felt> {
         forces
             .iter()
-            .map(|f| Felt::of(&[[0.0, 0.0, *f]], &[1.0], 0.0))
+            .map(|f| Felt::of(&[[0.0, 0.0, *f]], &[1.0], [0.0; 3]))
             .collect()
     }
 
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn opposite_parts_cancel_in_the_force_and_not_in_its_error() {
         let rows = [[0.2, 0.0, 0.7], [0.0, 0.0, -1.3]];
-        let felt = Felt::of(&rows, &[1.3, 0.7], 0.1);
+        let felt = Felt::of(&rows, &[1.3, 0.7], [0.0, 0.0, 0.1]);
         assert!((felt.force_n[2] - 0.1).abs() < 1e-15 && felt.force_n[0] == 0.26);
         assert!((felt.gross_n[2] - 1.82).abs() < 1e-15 && felt.gross_n[0] == 0.26);
         assert_eq!(felt.upward().force_n, [0.0, 0.0, felt.force_n[2]]);

@@ -28,7 +28,7 @@ use crate::plot::slices::Slice;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
-use crate::scene::passive;
+use crate::scene::passive::{self, Pull};
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
 use crate::scene::steel::{LINEAR_CORES, Solved};
@@ -172,7 +172,7 @@ struct Object {
     /// The force vector requested, on the nodes of `heights`; `None`: upward.
     direction: Option<Vec<f64>>,
     /// The force without currents, N.
-    passive_n: Option<Vec<f64>>,
+    passive_n: Option<Vec<[f64; 3]>>,
     rendered: Option<Rendered>,
 }
 
@@ -353,12 +353,20 @@ impl Object {
         let mut forces = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
         let upward: Vec<f64> = forces.iter().map(|force| force[2]).collect();
         let pull = passive::counted(scene, &positions_m)?;
-        let mut passive_n = pull.map(|pull| pull.forces_z_n(&positions_m));
+        let of_pull = |pull: Pull| -> Vec<[f64; 3]> {
+            positions_m
+                .par_iter()
+                .map(|at_m| pull.force_n(*at_m))
+                .collect()
+        };
+        let mut passive_n = pull.map(of_pull);
+        let upward_n = |passive: &Vec<[f64; 3]>| passive.iter().map(|force_n| force_n[2]).collect();
+        let offset_n: Option<Vec<f64>> = passive_n.as_ref().map(upward_n);
         progress.begin("lambda", 1);
         let problem = ForceProblem {
             forces_n_per_a: &upward,
             height_m: &of_lambda.height_m,
-            offset_n: passive_n.as_deref(),
+            offset_n: offset_n.as_deref(),
             weights: of_lambda.weights(),
             lower_a: &scene.lower_a,
             upper_a: &scene.upper_a,
@@ -448,14 +456,15 @@ impl Object {
                 let mut field = RenderedForces::default();
                 for (k, (place, row)) in places.iter().zip(rows.chunks_exact(coils)).enumerate() {
                     let passive = self.passive_n.as_ref();
-                    let passive_n = passive.map_or(0.0, |passive| passive[portion * PORTION + k]);
+                    let passive_n = passive.map_or([0.0; 3], |all| all[portion * PORTION + k]);
                     field
                         .fixed
                         .push(Felt::of(row, &rendered.currents_a, passive_n));
                     let [x, y, wanted_n] = other
                         .requested(place)
                         .map(|part| rendered.lambda_n_per_m * part);
-                    let wanted_n = wanted_n - passive_n;
+                    // A runtime knows the upward pull alone.
+                    let wanted_n = wanted_n - passive_n[2];
                     let reach = if other.direction.is_some() {
                         let target = [x, y, wanted_n];
                         allocators.vector.allocate(row, target, &mut currents).reach

@@ -347,12 +347,15 @@ fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
 /// The plate and other bodies of steel.
 fn bodies(iron: &IronSummary) -> String {
     let tenths = |m: f64| number((1e4 * m).round() / 10.0 + 0.0);
-    let mut text = format!(
-        "|B| up to {} T with all coils at their rated currents, at x, y, z = {} mm\nthe knee is at {} T",
-        number_to(iron.peak_field_t, 4),
-        iron.peak_at_m.map(tenths).join(", "),
-        number_to(iron.knee_t, 4)
-    );
+    let mut text = match iron.peak_field_t.zip(iron.peak_at_m) {
+        Some((peak_t, at_m)) => format!(
+            "|B| up to {} T with all coils at their rated currents, at x, y, z = {} mm\nthe knee is at {} T",
+            number_to(peak_t, 4),
+            at_m.map(tenths).join(", "),
+            number_to(iron.knee_t, 4)
+        ),
+        None => "not magnetised: relative_permeability = 1".to_owned(),
+    };
     if let Some(pull) = iron.passive_force_n {
         text.push_str(&format!(
             "\n{}{} by all unpowered steel, at the target's height over the middle coil",

@@ -208,7 +208,7 @@ impl LambdaOptions {
     pub(crate) fn tolerance_for(&self, design: &Design) -> Option<f64> {
         let of_error = self
             .error
-            .filter(|target| design.core.is_some() && !target.by_default);
+            .filter(|target| design.has_steel() && !target.by_default);
         self.tolerance.or(of_error.map(ErrorTarget::tolerance))
     }
 }

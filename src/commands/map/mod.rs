@@ -196,7 +196,7 @@ pub fn run(
     request: &MapRequest,
     progress: &dyn Progress,
 ) -> Result<MapReport, RunError> {
-    let of_error = request.error.filter(|_| design.core.is_some());
+    let of_error = request.error.filter(|_| design.has_steel());
     let tolerance = request.tolerance.or(of_error.map(ErrorTarget::tolerance));
     let scene = Scene::with_tolerance(design, tolerance)?;
     let mag_manip = &request.mag_manip;

@@ -511,8 +511,8 @@ pub struct Depths {
 pub struct IronPeaks {
     /// In the core of every coil; empty without cores.
     pub cores: Vec<Peak>,
-    /// In the rest.
-    pub elsewhere: Peak,
+    /// In the rest; `None` where none of that is magnetised.
+    pub elsewhere: Option<Peak>,
     /// A tolerance below which finer panels are taken, as far as memory allows; `None` where they are not.
     pub finer_below: Option<f64>,
 }
@@ -539,8 +539,8 @@ impl IronArray {
         for (peak, other) in peaks.cores.iter_mut().zip(&other.cores) {
             compare(peak, other)?;
         }
-        if peaks.elsewhere.field_t > 0.0 {
-            compare(&mut peaks.elsewhere, &other.elsewhere)?;
+        if let (Some(peak), Some(other)) = (&mut peaks.elsewhere, &other.elsewhere) {
+            compare(peak, other)?;
         }
         Ok(peaks)
     }
@@ -601,16 +601,15 @@ impl IronArray {
                 *of = Some((value, candidate));
             }
         }
-        let climbed = best
-            .into_par_iter()
-            .map(|best| match best {
-                Some((value, from)) => self.climb(value, from, &field_t),
-                None => Ok(Peak::default()),
-            })
-            .collect::<Result<Vec<Peak>, OnEdge>>()?;
+        let climb = |best: Option<(f64, &Candidate)>| {
+            let peak = best.map(|(value, from)| self.climb(value, from, &field_t));
+            peak.transpose()
+        };
+        let climbed = best.into_par_iter().map(climb);
+        let mut climbed = climbed.collect::<Result<Vec<Option<Peak>>, OnEdge>>()?;
         Ok(IronPeaks {
-            elsewhere: climbed[cores],
-            cores: climbed[..cores].to_vec(),
+            elsewhere: climbed.pop().flatten(),
+            cores: climbed.into_iter().map(Option::unwrap_or_default).collect(),
             finer_below: self.finer_below,
         })
     }
