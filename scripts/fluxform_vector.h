@@ -13,6 +13,7 @@
 #define REFINEMENTS 3
 #define PULL 1e-9
 #define PIVOT 1e-13
+#define SPANNED 1e-6
 
 enum { AT_LOWER, AT_FREE, AT_UPPER };
 
@@ -299,66 +300,98 @@ static int is_nearest(const vector_problem *p, int rows)
     return 1;
 }
 
-/* Whether no current of a coil gives a force: the request does not decide it. */
-static int is_idle(const vector_problem *p, size_t i)
+/* By how much the force of a coil differs from `mean`, per ampere. */
+static void differs(const vector_problem *p, size_t i, const double *mean, double *more)
 {
-    return dot(p->rows + 4 * i, p->rows + 4 * i, 3) == 0;
+    for (int k = 0; k < 4; k++)
+        more[k] = p->rows[4 * i + (size_t)k] - mean[k];
 }
 
-/* Solves the free currents, of which there are no more than rows, for the nearest force; whether it is. Coils
- * without force do not count: they carry nothing, or where the sum binds what the others leave of it. */
+/* Orthonormal axes of the space that the free coils' differences span, each by its power, the longest first; none for
+ * what is no longer than `least`. Returns their number. */
+static int spanned(const vector_problem *p, const double *mean, double least, double axes[3][4])
+{
+    for (int count = 0; count < 3; count++) {
+        double longest = least;
+        for (size_t i = 0; i < p->n; i++) {
+            double rest[4], length;
+            if ((int)p->at[i] != AT_FREE)
+                continue;
+            differs(p, i, mean, rest);
+            for (int k = 0; k < 4; k++)
+                rest[k] *= sqrt(p->conductance[i]);
+            for (int a = 0; a < count; a++) {
+                double along = dot(rest, axes[a], 3);
+                for (int k = 0; k < 4; k++)
+                    rest[k] -= along * axes[a][k];
+            }
+            length = sqrt(dot(rest, rest, 3));
+            if (length > longest) {
+                longest = length;
+                for (int k = 0; k < 4; k++)
+                    axes[count][k] = rest[k] / length;
+            }
+        }
+        if (longest <= least)
+            return count;
+    }
+    return 3;
+}
+
+/* Solves the free currents for the nearest force, of several by the least power; whether it is. Where the sum binds
+ * they share what the others leave of it, and a coil counts by how much its force differs from their mean. */
 static int finish_nearest(vector_problem *p, int rows)
 {
-    size_t free[4];
-    int count = 0, unknowns;
-    double left[4], base[4] = {0, 0, 0, 0}, columns[4][4], system[4][4], projected[4], solved[4], rest = 0, given = 0;
-    double idle = 0;
+    double mean[4] = {0, 0, 0, 0}, axes[3][4], system[4][4], projected[4], solved[4], y[4] = {0, 0, 0, 0};
+    double left[4], right[4], sum = 0, conductance = 1, least = 0;
+    int count;
     for (size_t i = 0; i < p->n; i++) {
+        const double *h = p->rows + 4 * i;
+        double size = sqrt(p->conductance[i] * dot(h, h, 3));
         if ((int)p->at[i] != AT_FREE)
             continue;
         p->currents[i] = 0;
-        if (is_idle(p, i))
-            idle += p->conductance[i];
-        else if (count == 4)
-            return 0;
-        else
-            free[count++] = i;
+        least = size > least ? size : least;
+        for (int k = 0; k < 4; k++)
+            mean[k] += p->conductance[i] * h[k];
     }
     missing_force(p, left);
-    /* With a sum that binds, the last free coil takes what the others leave of it, if all give a force. */
-    unknowns = count;
-    if (rows == 4 && idle == 0 && count > 0) {
-        unknowns = count - 1;
-        memcpy(base, p->rows + 4 * free[unknowns], sizeof base);
-        rest = left[3];
-    }
-    memset(solved, 0, sizeof solved);
-    for (int a = 0; a < unknowns; a++) {
-        projected[a] = 0;
-        for (int k = 0; k < 3; k++) {
-            columns[a][k] = p->rows[4 * free[a] + (size_t)k] - base[k];
-            projected[a] += columns[a][k] * (left[k] - base[k] * rest);
-        }
-        for (int b = 0; b <= a; b++)
-            system[a][b] = dot(columns[a], columns[b], 3);
-    }
-    if (unknowns > 0 && !solve_cholesky(system, projected, unknowns, PIVOT, solved))
-        return 0;
-    for (int a = 0; a < unknowns; a++) {
-        p->currents[free[a]] = solved[a];
-        given += solved[a];
-    }
-    if (unknowns < count)
-        p->currents[free[unknowns]] = left[3] - given;
+    if (rows == 4 && mean[3] > 0) {
+        sum = left[3];
+        conductance = mean[3];
+        for (int k = 0; k < 4; k++)
+            mean[k] /= conductance;
+    } else
+        memset(mean, 0, sizeof mean);
+    for (int k = 0; k < 3; k++)
+        right[k] = left[k] - mean[k] * sum;
+    count = spanned(p, mean, SPANNED * least, axes);
+    memset(system, 0, sizeof system);
+    for (int a = 0; a < count; a++)
+        projected[a] = dot(axes[a], right, 3);
     for (size_t i = 0; i < p->n; i++) {
-        double slack = MET * (p->upper[i] - p->lower[i]);
+        double more[4];
         if ((int)p->at[i] != AT_FREE)
             continue;
-        if (rows == 4 && is_idle(p, i))
-            p->currents[i] = (left[3] - given) * p->conductance[i] / idle;
-        if (!(p->currents[i] >= p->lower[i] - slack && p->currents[i] <= p->upper[i] + slack))
+        differs(p, i, mean, more);
+        for (int a = 0; a < count; a++)
+            for (int b = 0; b <= a; b++)
+                system[a][b] += p->conductance[i] * (dot(axes[a], more, 3) * dot(axes[b], more, 3));
+    }
+    if (!solve_cholesky(system, projected, count, PIVOT, solved))
+        return 0;
+    for (int k = 0; k < 3; k++)
+        for (int a = 0; a < count; a++)
+            y[k] += axes[a][k] * solved[a];
+    for (size_t i = 0; i < p->n; i++) {
+        double more[4], current, slack = MET * (p->upper[i] - p->lower[i]);
+        if ((int)p->at[i] != AT_FREE)
+            continue;
+        differs(p, i, mean, more);
+        current = p->conductance[i] * (sum / conductance + dot(more, y, 3));
+        if (!(current >= p->lower[i] - slack && current <= p->upper[i] + slack))
             return 0;
-        p->currents[i] = clamp(p->currents[i], p->lower[i], p->upper[i]);
+        p->currents[i] = clamp(current, p->lower[i], p->upper[i]);
     }
     return is_nearest(p, rows);
 }

@@ -569,51 +569,53 @@ function [d, optimal] = finish_exactly(d, climbed, n)
 end
 
 function [d, nearest] = finish_nearest(d, n)
-% Solves the free currents, few as they are, for the nearest force; whether it is.
+% Solves the free currents for the nearest force, of several by the least power; whether it is. Where the sum binds
+% they share what the others leave of it, and a coil counts by how much its force differs from their mean.
     nearest = false;
-    all_free = find(d.at == 0);
-    d.currents(all_free) = 0;
-    % Coils without force carry nothing, or where the sum binds what the others leave of it.
-    forceless = ~any(d.rows(all_free, 1:3), 2);
-    free = all_free(~forceless);
-    idle = all_free(forceless);
-    if numel(free) > 4
-        return
-    end
+    free = find(d.at == 0);
+    d.currents(free) = 0;
     left = missing_force(d);
-    % Without any of them the last free coil takes it.
-    last = free([]);
-    if n == 4 && isempty(idle)
-        last = free(max(numel(free), 1):end);
+    conductance = d.conductance(free);
+    more = d.rows(free, 1:3);
+    least = 1e-6 * max([sqrt(conductance) .* sqrt(sum(more .^ 2, 2)); 0]);
+    shared = zeros(numel(free), 1);
+    if n == 4 && ~isempty(free)
+        mean = sum(more .* conductance, 1) / sum(conductance);
+        more = more - mean;
+        shared = left(4) * conductance / sum(conductance);
+        left(1:3) = left(1:3) - mean.' * left(4);
     end
-    others = free(1:numel(free) - numel(last));
-    base = sum(d.rows(last, 1:3), 1);
-    rest = 0;
-    if ~isempty(last)
-        rest = left(4);
-    end
-    columns = d.rows(others, 1:3) - base;
-    if ~isempty(others)
-        solved = cholesky(columns * columns.', columns * (left(1:3) - base.' * rest), 1e-13);
+    axes = spanned(more .* sqrt(conductance), least);
+    y = zeros(3, 1);
+    if ~isempty(axes)
+        along = more * axes;
+        solved = cholesky(along.' * (along .* conductance), axes.' * left(1:3), 1e-13);
         if isempty(solved)
             return
         end
-        d.currents(others) = solved;
+        y = axes * solved;
     end
-    if ~isempty(last)
-        d.currents(last) = left(4) - sum(d.currents(others));
-    end
-    if n == 4 && ~isempty(idle)
-        share = d.conductance(idle) / sum(d.conductance(idle));
-        d.currents(idle) = (left(4) - sum(d.currents(others))) * share;
-    end
-    slack = 1e-11 * (d.upper(all_free) - d.lower(all_free));
-    found = d.currents(all_free);
-    if ~all(found >= d.lower(all_free) - slack & found <= d.upper(all_free) + slack)
+    found = shared + conductance .* (more * y);
+    slack = 1e-11 * (d.upper(free) - d.lower(free));
+    if ~all(found >= d.lower(free) - slack & found <= d.upper(free) + slack)
         return
     end
-    d.currents(all_free) = min(max(found, d.lower(all_free)), d.upper(all_free));
+    d.currents(free) = min(max(found, d.lower(free)), d.upper(free));
     nearest = is_nearest(d, n);
+end
+
+function axes = spanned(forces, least)
+% Orthonormal axes, [component, axis], of the space that forces span, the longest first; none for what is no longer
+% than `least`.
+    axes = zeros(3, 0);
+    while size(axes, 2) < 3
+        rest = forces - (forces * axes) * axes.';
+        [length, at] = max(sqrt(sum(rest .^ 2, 2)));
+        if isempty(length) || ~(length > least)
+            return
+        end
+        axes(:, end + 1) = rest(at, :).' / length; %#ok<AGROW>
+    end
 end
 
 function nearest = is_nearest(d, n)

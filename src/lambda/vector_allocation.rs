@@ -51,6 +51,8 @@ const PULL: f64 = 1e-9;
 const ROUNDING: f64 = 1e-14;
 /// Pivots below this share of the largest make a system singular.
 const PIVOT: f64 = 1e-13;
+/// Forces are along an axis of their own from this part of the largest on.
+const SPANNED: f64 = 1e-6;
 
 /// Rows of the dual: the force's components, then the sum.
 type Rows = [f64; 4];
@@ -480,82 +482,61 @@ impl VectorAllocator {
         y.iter().map(|v| v.abs()).sum()
     }
 
-    /// Whether no current of a coil gives a force: the request does not decide it.
-    fn idle(&self, i: usize) -> bool {
-        self.rows[i][..3] == [0.0; 3]
-    }
-
-    /// Solves the free currents for the nearest force, of which there are no more than components;
-    /// whether no other currents within the limits come nearer. Coils without force do not count: they
-    /// carry nothing, or where the sum binds what the others leave of it, by the least power.
+    /// Solves the free currents for the nearest force, of several by the least power; whether no other currents
+    /// within the limits come nearer. Where the sum binds they share what the others leave of it, and a coil
+    /// counts by how much its force differs from their mean.
     fn finish_nearest(&mut self, rows: usize, target: &Rows) -> bool {
-        const MOST: usize = 4;
-        let mut free = [0; MOST];
-        let mut count = 0;
-        let mut idle = 0.0;
+        let mut mean = [0.0; 4];
         for i in 0..self.at.len() {
-            if self.at[i] != Limit::Free {
-                continue;
-            }
-            self.currents[i] = 0.0;
-            if self.idle(i) {
-                idle += self.conductance[i];
-            } else if count == MOST {
-                return false;
-            } else {
-                free[count] = i;
-                count += 1;
+            if self.at[i] == Limit::Free {
+                self.currents[i] = 0.0;
+                for (part, h) in mean.iter_mut().zip(&self.rows[i]) {
+                    *part += self.conductance[i] * h;
+                }
             }
         }
         let (left, _) = self.left(target);
-        // With a sum that binds, the last free coil takes what the others leave of it, if all give a force.
-        let last = (rows == 4 && idle == 0.0 && count > 0).then(|| free[count - 1]);
-        let unknowns = if last.is_some() { count - 1 } else { count };
-        let column = |i: usize| -> Rows {
-            let h = self.rows[i];
-            let base = last.map_or([0.0; 4], |q| self.rows[q]);
-            [h[0] - base[0], h[1] - base[1], h[2] - base[2], 0.0]
+        let shares = rows == 4 && mean[3] > 0.0;
+        let (mean, sum_a, conductance) = match shares {
+            true => (mean.map(|part| part / mean[3]), left[3], mean[3]),
+            false => ([0.0; 4], 0.0, 1.0),
         };
-        let base = last.map_or([0.0; 4], |q| self.rows[q]);
-        let rest = if last.is_some() { left[3] } else { 0.0 };
-        let right: Rows = std::array::from_fn(|k| left[k] - base[k] * rest);
+        let more = |i: usize| -> Rows { std::array::from_fn(|k| self.rows[i][k] - mean[k]) };
+        let right: Rows = std::array::from_fn(|k| left[k] - mean[k] * sum_a);
+        let free = || (0..self.at.len()).filter(|i| self.at[*i] == Limit::Free);
+        let by_power = |i: usize, force: Rows| force.map(|part| part * self.conductance[i].sqrt());
+        let sizes = free().map(|i| size(&by_power(i, self.rows[i])));
+        let least = SPANNED * sizes.fold(0.0, f64::max);
+        let axes = spanned(|| free().map(|i| by_power(i, more(i))), least);
         let mut system = [[0.0; 4]; 4];
         let mut projected = [0.0; 4];
-        for a in 0..unknowns {
-            let of_a = column(free[a]);
-            projected[a] = dot(&of_a, &right, 3);
-            for b in 0..=a {
-                system[a][b] = dot(&of_a, &column(free[b]), 3);
+        for (a, of_a) in axes.iter().enumerate() {
+            projected[a] = dot(of_a, &right, 3);
+            for (b, of_b) in axes[..=a].iter().enumerate() {
+                let along = |i: usize| dot(of_a, &more(i), 3) * dot(of_b, &more(i), 3);
+                system[a][b] = free().map(|i| self.conductance[i] * along(i)).sum();
             }
         }
-        let solved = if unknowns == 0 {
-            Some([0.0; 4])
-        } else {
-            cholesky_solve(&system, &projected, unknowns, PIVOT)
-        };
-        let Some(solved) = solved else {
+        let Some(solved) = cholesky_solve(&system, &projected, axes.len(), PIVOT) else {
             return false;
         };
-        for a in 0..unknowns {
-            self.currents[free[a]] = solved[a];
-        }
-        let of_sum = left[3] - solved[..unknowns].iter().sum::<f64>();
-        if let Some(last) = last {
-            self.currents[last] = of_sum;
-        }
+        let y: Rows = std::array::from_fn(|k| {
+            axes.iter()
+                .zip(&solved)
+                .map(|(axis, part)| axis[k] * part)
+                .sum()
+        });
         for i in 0..self.at.len() {
             if self.at[i] != Limit::Free {
                 continue;
             }
-            if rows == 4 && self.idle(i) {
-                self.currents[i] = of_sum * self.conductance[i] / idle;
-            }
+            let current = self.conductance[i] * (sum_a / conductance + dot(&more(i), &y, 3));
             let (lower, upper) = self.limits.limits_a(i);
             let slack = MET * (upper - lower);
-            if self.currents[i] < lower - slack || self.currents[i] > upper + slack {
+            if !(current >= lower - slack && current <= upper + slack) {
                 return false;
             }
-            self.currents[i] = self.currents[i].clamp(lower, upper);
+            self.currents[i] = current.clamp(lower, upper);
         }
         self.nearest(rows, target)
     }
@@ -589,6 +570,33 @@ impl VectorAllocator {
             Limit::Upper => pull(i) >= threshold - slack,
         })
     }
+}
+
+/// Orthonormal axes of the space that forces span, the longest first; no axis for what is no longer than `least`.
+fn spanned<I: Iterator<Item = Rows>>(forces: impl Fn() -> I, least: f64) -> Vec<Rows> {
+    let mut axes: Vec<Rows> = Vec::with_capacity(3);
+    while axes.len() < 3 {
+        let rest = |force: Rows| {
+            axes.iter().fold(force, |rest, axis| {
+                let along = dot(&rest, axis, 3);
+                std::array::from_fn(|k| rest[k] - along * axis[k])
+            })
+        };
+        let rests = forces().map(rest);
+        match rests.max_by(|a, b| size(a).total_cmp(&size(b))) {
+            Some(longest) if size(&longest) > least => {
+                let length = size(&longest);
+                axes.push(longest.map(|part| part / length));
+            }
+            _ => break,
+        }
+    }
+    axes
+}
+
+/// Of a force.
+fn size(force: &Rows) -> f64 {
+    dot(force, force, 3).sqrt()
 }
 
 fn dot(a: &Rows, b: &Rows, rows: usize) -> f64 {

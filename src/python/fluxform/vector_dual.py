@@ -8,7 +8,7 @@ class Dual:
 
     EPS_FIRST, EPS_LEAST, EPS_FACTOR, EPS_SUM = 1e-7, 1e-14, 1e-3, 1e-6
     STEPS, SLOPE_LEFT, REFINEMENTS = 60, 0.1, 3
-    MET, PULL, PIVOT, ROUNDING = 1e-11, 1e-9, 1e-13, 1e-14
+    MET, PULL, PIVOT, ROUNDING, SPANNED = 1e-11, 1e-9, 1e-13, 1e-14, 1e-6
 
     def __init__(self, rows, target, conductance, lower, upper):
         self.rows, self.target, self.conductance = rows, target, conductance
@@ -116,36 +116,32 @@ class Dual:
         return self.reached() and bool(np.sum(self.currents) <= self.target[3] + self.MET * terms)
 
     def finish_nearest(self, n):
-        """Solves the free currents, few as they are, for the nearest force; whether it is."""
-        all_free = np.flatnonzero(self.at == 0)
-        self.currents[all_free] = 0.0
-        # Coils without force carry nothing, or where the sum binds what the others leave of it.
-        forceless = ~np.any(self.rows[all_free, :3], axis=1)
-        free, idle = all_free[~forceless], all_free[forceless]
-        if len(free) > 4:
-            return False
+        """Solves the free currents for the nearest force, of several by the least power; whether it is. Where the
+        sum binds they share what the others leave of it, and a coil counts by how much it differs from their mean."""
+        free = np.flatnonzero(self.at == 0)
+        self.currents[free] = 0.0
         left, _ = self.left()
-        # Without any of them the last free coil takes it.
-        last = free[-1:] if n == 4 and len(idle) == 0 else free[:0]
-        others = free[: len(free) - len(last)]
-        base = self.rows[last, :3].sum(axis=0)
-        rest = left[3] if len(last) else 0.0
-        columns = self.rows[others, :3] - base
-        solved = np.zeros(0)
-        if len(others):
-            solved = _cholesky(columns @ columns.T, columns @ (left[:3] - base * rest), self.PIVOT)
+        right, conductance, more = left[:3], self.conductance[free], self.rows[free, :3]
+        least = self.SPANNED * np.max(np.sqrt(conductance) * np.linalg.norm(more, axis=1), initial=0.0)
+        shared = np.zeros(len(free))
+        if n == 4 and len(free):
+            mean = conductance @ more / np.sum(conductance)
+            more = more - mean
+            shared = left[3] * conductance / np.sum(conductance)
+            right = right - mean * left[3]
+        axes = _spanned(more * np.sqrt(conductance)[:, None], least)
+        y = np.zeros(3)
+        if axes.shape[1]:
+            along = more @ axes
+            solved = _cholesky((along.T * conductance) @ along, axes.T @ right, self.PIVOT)
             if solved is None:
                 return False
-        self.currents[others] = solved
-        self.currents[last] = left[3] - np.sum(solved)
-        if n == 4 and len(idle):
-            share = self.conductance[idle] / np.sum(self.conductance[idle])
-            self.currents[idle] = (left[3] - np.sum(solved)) * share
-        lower, upper, found = self.lower[all_free], self.upper[all_free], self.currents[all_free]
+            y = axes @ solved
+        lower, upper, found = self.lower[free], self.upper[free], shared + conductance * (more @ y)
         slack = self.MET * (upper - lower)
         if not np.all((found >= lower - slack) & (found <= upper + slack)):
             return False
-        self.currents[all_free] = np.clip(found, lower, upper)
+        self.currents[free] = np.clip(found, lower, upper)
         return self.nearest(n)
 
     def nearest(self, n):
@@ -221,6 +217,20 @@ class Dual:
                 self.lower_to_sum()
                 return self.reached(), False
             share *= self.EPS_FACTOR
+
+
+def _spanned(forces, least):
+    """Orthonormal axes, [component, axis], of the space that forces span, the longest first; none for what is no
+    longer than `least`."""
+    axes = np.zeros((3, 0))
+    while axes.shape[1] < 3:
+        rest = forces - (forces @ axes) @ axes.T
+        lengths = np.linalg.norm(rest, axis=1)
+        if not np.max(lengths, initial=0.0) > least:
+            break
+        longest = np.argmax(lengths)
+        axes = np.column_stack([axes, rest[longest] / lengths[longest]])
+    return axes
 
 
 def _cholesky(matrix, right, least):
