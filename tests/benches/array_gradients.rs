@@ -294,7 +294,7 @@ fn main() -> Result<(), Failure> {
         },
         every_count: false,
     };
-    let all = problems(&design, &request, &reference.merits, &physics)?;
+    let all = problems(&design, &request, &reference.merits, &physics)?.all;
     let given = all[0].space.given(&design);
     let variables = given.len();
     let started = ProcessTime::now();

@@ -231,3 +231,87 @@ fn the_worth_of_limits_to_whole_turns_names_the_wire_that_it_is_of() {
         "of a coil whose turns need not be whole, of 0.8 mm wire: whole ones take it in steps";
     assert!(text.contains(worth), "{text}");
 }
+
+/// A search of two coils or three over a flat, with a limit and further choices.
+fn rows_of_coils(place: &Place, columns: &str, limit: &str) -> Vec<&'static str> {
+    place.write(
+        "row.toml",
+        &format!(
+            "name = \"row\"\n[coil]\ninner_diameter_mm = 12.0\nouter_diameter_mm = 34.0\nlength_mm = 60.0\n\
+             [wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 3\npitch_mm = 45.0\n[magnet]\n\
+             polarity = \"repel\"\n[supply]\ncurrent_max_a = 2.0\nvoltage_v = 36.0\n[limits]\n{limit}\n\
+             [target]\nheight_mm = 30.0\n[search]\narray.pitch_mm = [36, 60]\narray.columns = {columns}\n"
+        ),
+    );
+    place.write(
+        "box.toml",
+        "name = \"box\"\nprimitive = \"flat\"\nside_mm = 60\nheight_mm = 40\n[points]\nx_mm = [-30, 30, 7]\n\
+         y_mm = [-30, 30, 7]\n",
+    );
+    let search = [
+        "optimize",
+        "row.toml",
+        "--for",
+        "box.toml",
+        "--evaluations",
+        "40",
+    ];
+    [
+        &search[..],
+        &["--out", "best.toml", "--force", "--format", "json"],
+    ]
+    .concat()
+}
+
+/// A limit that all arrays of a choice break alike was left out, although those of another choice meet it.
+#[test]
+fn a_choice_that_breaks_a_limit_yields_to_one_that_meets_it() {
+    let place = Place::new();
+    for limit in ["array_power_max_w = 40", "array_mass_max_kg = 0.8"] {
+        let found = place
+            .run(&rows_of_coils(&place, "[2, 3]", limit))
+            .ends(0)
+            .json();
+        assert_eq!(found["limits_met"], true, "{limit}");
+        let warned = found["warnings"].to_string();
+        assert!(
+            warned.contains("1 x 3 coils, grid: no design within [search] meets"),
+            "{warned}"
+        );
+        place
+            .run(&["evaluate", "best.toml", "--strict", "-q"])
+            .ends(0);
+    }
+    // A limit that no choice changes remains a warning, one that none meets is an error.
+    let found = place
+        .run(&rows_of_coils(&place, "[2, 3]", "resistance_max_ohm = 1"))
+        .ends(0);
+    assert!(
+        found.out.contains("nothing that is searched changes it"),
+        "{}",
+        found.out
+    );
+    place
+        .run(&rows_of_coils(&place, "[2, 3]", "array_power_max_w = 20"))
+        .ends(3);
+    // The heat of static currents depends on the pitch, although here every array takes all that is allowed.
+    let missed = place
+        .run(&rows_of_coils(&place, "[2, 3]", "static_power_max_w = 20"))
+        .ends(4);
+    assert_eq!(missed.json()["limits_met"], false);
+}
+
+/// One coil has no pitch: that choice was left out without a word.
+#[test]
+fn a_choice_of_one_coil_has_no_pitch() {
+    let place = Place::new();
+    let found = place
+        .run(&rows_of_coils(&place, "[1, 2]", ""))
+        .ends(0)
+        .json();
+    let coils = found["choices"].as_array().unwrap().iter();
+    let coils: Vec<u64> = coils
+        .map(|choice| choice["coils"].as_u64().unwrap())
+        .collect();
+    assert!(coils.contains(&1) && coils.contains(&2), "{coils:?}");
+}

@@ -4,6 +4,7 @@
 //! of limits, `numerics::mixed_search` finds the best; what the force constants are is asked of a
 //! [`problem::Physics`].
 
+pub mod choice;
 mod plate;
 pub mod positions;
 pub mod problem;

@@ -232,8 +232,7 @@ pub struct ArrayProblem<'a> {
     /// Logarithms of the merits that count as 1.
     reference_ln: Vec<f64>,
     room: Room,
-    /// Limits that are no part of the search, by key: those of the coil that all designs of the space meet or
-    /// break alike.
+    /// Limits that are no part of the search, by key: those that all designs of all choices meet or break alike.
     left_out: Vec<&'static str>,
     /// The correction of the search's outputs to full accuracy.
     correction: RwLock<Vec<f64>>,
@@ -251,7 +250,7 @@ impl<'a> ArrayProblem<'a> {
         reference: &[f64],
         room: Room,
     ) -> Self {
-        let mut problem = Self {
+        Self {
             space,
             physics,
             objective,
@@ -260,9 +259,7 @@ impl<'a> ArrayProblem<'a> {
             left_out: Vec::new(),
             correction: RwLock::default(),
             known: RwLock::default(),
-        };
-        problem.left_out = problem.unchanged_limits();
-        problem
+        }
     }
 
     /// Takes the limits of this key out of the search.
@@ -275,7 +272,8 @@ impl<'a> ArrayProblem<'a> {
         self.left_out.retain(|known| *known != key);
     }
 
-    fn unchanged_limits(&self) -> Vec<&'static str> {
+    /// The limits that all designs of the space meet or break alike.
+    pub(super) fn unchanged_limits(&self) -> Vec<Bounded> {
         if self.space.is_wound() {
             return Vec::new();
         }
@@ -284,8 +282,9 @@ impl<'a> ArrayProblem<'a> {
             let x: Vec<f64> = self.space.variables().iter().map(end).collect();
             Self::of_table(&self.space.design(&x), None)
         });
-        let unchanged = low.iter().filter(|bound| high.contains(bound));
-        unchanged.map(|bound| bound.key).collect()
+        low.into_iter()
+            .filter(|bound| high.contains(bound))
+            .collect()
     }
 
     fn corrected(&self, outputs: &[f64]) -> Vec<f64> {

@@ -8,8 +8,9 @@ use fluxform_base::progress::{Interrupted, interruptible, to_its_end};
 use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Search, Settings};
 
+use super::choice::{Choice, choices};
 use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges};
-use super::space::{Choice, Space, choices};
+use super::space::Space;
 use crate::limits::LimitName;
 
 /// Why no search begins where no key varies.
@@ -243,50 +244,78 @@ const CORRECTING: usize = 24;
 /// Evaluations that every one of several choices has at least, per variable and in all.
 const LEAST_EVALUATIONS: usize = 16;
 
+/// What is searched.
+pub struct Problems<'a> {
+    /// A problem a choice.
+    pub all: Vec<ArrayProblem<'a>>,
+    /// Choices of which there is no array, and why.
+    pub refused: Vec<String>,
+}
+
 /// The problems of every choice, after what can be known without forces.
 ///
 /// # Errors
-/// Keys, ranges and limits that contradict each other.
+/// Keys, ranges and limits that contradict each other, in every choice.
 pub fn problems<'a>(
     design: &Design,
     request: &Request,
     reference: &[f64],
     physics: &'a dyn Physics,
-) -> Result<Vec<ArrayProblem<'a>>, Refused> {
+) -> Result<Problems<'a>, Refused> {
+    let made = |choice: Choice| {
+        let space = Space::new(design, &design.search, &choice).map_err(Refused::Space);
+        let objective = request.objective.clone();
+        let problem = space
+            .map(|space| ArrayProblem::new(space, physics, objective, reference, request.room));
+        (choice, problem)
+    };
+    let made = choices(design, &design.search).into_iter().map(made);
+    let made: Vec<(Choice, Result<ArrayProblem, Refused>)> = made.collect();
+    let unchanged = made
+        .iter()
+        .flat_map(|(_, problem)| problem)
+        .map(ArrayProblem::unchanged_limits);
+    let unchanged = unchanged.reduce(|known, other| {
+        known
+            .into_iter()
+            .filter(|bound| other.contains(bound))
+            .collect()
+    });
     let mut faults = Vec::new();
-    let mut problems = Vec::new();
-    for choice in choices(design, &design.search) {
-        match problem(design, request, &choice, reference, physics) {
-            Ok(problem) => problems.push(problem),
-            Err(refused) => faults.push(refused),
+    let mut all = Vec::new();
+    for (choice, problem) in made {
+        let searched = problem.and_then(|mut problem| {
+            let keys = unchanged.iter().flatten().map(|bound| bound.key);
+            keys.for_each(|key| problem.leave_out(key));
+            possible(problem, design, request)
+        });
+        match searched {
+            Ok(problem) => all.push(problem),
+            Err(refused) => faults.push((choice, refused)),
         }
     }
+    let refused = faults
+        .iter()
+        .map(|(choice, refused)| format!("{}: {refused}", choice.described()));
+    let refused = refused.collect();
     match faults.into_iter().next() {
-        Some(refused) if problems.is_empty() => Err(refused),
-        _ if problems.len() == 1 && problems[0].space.axes().is_empty() => {
+        Some((_, refused)) if all.is_empty() => Err(refused),
+        _ if all.len() == 1 && all[0].space.axes().is_empty() => {
             Err(Refused::Space(NOTHING_SEARCHED.to_owned()))
         }
-        _ => Ok(problems),
+        _ => Ok(Problems { all, refused }),
     }
 }
 
-fn problem<'a>(
+/// `problem`, if any of its designs meets the limits that need no forces.
+fn possible<'a>(
+    problem: ArrayProblem<'a>,
     design: &Design,
     request: &Request,
-    choice: &Choice,
-    reference: &[f64],
-    physics: &'a dyn Physics,
 ) -> Result<ArrayProblem<'a>, Refused> {
-    let space = Space::new(design, &design.search, choice).map_err(Refused::Space)?;
-    let problem = ArrayProblem::new(
-        space,
-        physics,
-        request.objective.clone(),
-        reference,
-        request.room,
-    );
+    let given = problem.space.given(design);
     let search = Search::new(&problem, request.settings);
-    let (x, judged) = search.least_broken(&problem.space.given(design));
+    let (x, judged) = search.least_broken(&given);
     if judged.excess() <= MET {
         return Ok(problem);
     }
@@ -299,7 +328,6 @@ fn problem<'a>(
     let broken: Vec<String> = broken
         .map(|bound| format!("{} {}", label(bound), in_unit(bound, bound.value)))
         .collect();
-    let given = problem.space.given(design);
     let limits: Vec<String> = contradicting(problem, &given, &bounds, request.settings)
         .iter()
         .map(|bound| {

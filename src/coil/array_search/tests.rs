@@ -78,7 +78,9 @@ fn one_coil_alone_is_the_best_coil_of_eq_11() {
     use crate::optimum::{Settings, optimise_wound};
     use fluxform_field::magnet::MagnetRule;
     let design = design(ONE_COIL);
-    let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
+    let all = problems(&design, &request(), &[1.0], &OnAxis)
+        .expect("a search")
+        .all;
     let found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
@@ -121,7 +123,9 @@ fn one_coil_alone_is_the_best_coil_of_eq_11() {
 #[test]
 fn the_study_holds_against_what_it_says() {
     let design = design(ONE_COIL);
-    let all = problems(&design, &request(), &[1.0], &OnAxis).expect("a search");
+    let all = problems(&design, &request(), &[1.0], &OnAxis)
+        .expect("a search")
+        .all;
     let mut found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
@@ -178,7 +182,9 @@ fn regression_a_better_array_that_was_met_later_was_not_taken() {
     let design = design(ONE_COIL);
     let mut request = request();
     request.settings.evaluations = 8;
-    let all = problems(&design, &request, &[1.0], &WideIsBetter).expect("a search");
+    let all = problems(&design, &request, &[1.0], &WideIsBetter)
+        .expect("a search")
+        .all;
     let mut found = run(&all, &design, &request)
         .expect("not interrupted")
         .expect("a design");
@@ -225,7 +231,9 @@ fn regression_a_core_turned_inside_out_took_all_memory() {
                   [search]\ncoil.inner_diameter_mm = [3.0, 30.0]\ncoil.length_mm = [10.0, 100.0]\n\
                   core.above_mm = [-200.0, 5.0]\ncore.below_mm = [-200.0, 5.0]\ncore.clearance_mm = [0.0, 9.0]\n";
     let design = design(search);
-    let all = problems(&design, &request(), &[1.0], &NoCoreInsideOut).expect("a search");
+    let all = problems(&design, &request(), &[1.0], &NoCoreInsideOut)
+        .expect("a search")
+        .all;
     let found = run(&all, &design, &request())
         .expect("not interrupted")
         .expect("a design");
@@ -274,7 +282,9 @@ fn regression_the_trade_offs_were_those_of_one_number_of_coils() {
         every_count: true,
         ..request()
     };
-    let all = problems(&design, &request, &[1.0], &MoreCoilsSettleLater).expect("a search");
+    let all = problems(&design, &request, &[1.0], &MoreCoilsSettleLater)
+        .expect("a search")
+        .all;
     let mut found = run(&all, &design, &request)
         .expect("not interrupted")
         .expect("a design");
@@ -332,7 +342,9 @@ fn regression_an_array_worse_than_the_given_one_was_the_best() {
         let design = design(&format!("{array}{ONE_COIL}{more}"));
         let mut request = request();
         request.settings.evaluations = 40;
-        let all = problems(&design, &request, &[1.0], &SearchIsFarOff).expect("a search");
+        let all = problems(&design, &request, &[1.0], &SearchIsFarOff)
+            .expect("a search")
+            .all;
         let found = run(&all, &design, &request)
             .expect("not interrupted")
             .expect("a design");
@@ -377,7 +389,9 @@ fn regression_half_millimetres_were_worse_than_whole_ones() {
     let design = design(ONE_COIL);
     let mut request = request();
     request.settings.evaluations = 30;
-    let all = problems(&design, &request, &[1.0], &BadAtOneBore).expect("a search");
+    let all = problems(&design, &request, &[1.0], &BadAtOneBore)
+        .expect("a search")
+        .all;
     let mut found = run(&all, &design, &request)
         .expect("not interrupted")
         .expect("a design");
@@ -423,7 +437,9 @@ fn regression_the_trade_offs_were_estimates() {
         ..request()
     };
     request.settings.evaluations = 40;
-    let all = problems(&design, &request, &[1.0], &OffByBore).expect("a search");
+    let all = problems(&design, &request, &[1.0], &OffByBore)
+        .expect("a search")
+        .all;
     let mut found = run(&all, &design, &request)
         .expect("not interrupted")
         .expect("a design");
@@ -455,7 +471,9 @@ fn regression_the_trade_offs_were_estimates() {
 #[test]
 fn regression_a_limit_was_worth_several_times_what_more_of_it_gave() {
     let merit = |design: &Design, studied: bool| {
-        let all = problems(design, &request(), &[1.0], &OnAxis).expect("a search");
+        let all = problems(design, &request(), &[1.0], &OnAxis)
+            .expect("a search")
+            .all;
         let mut found = run(&all, design, &request())
             .expect("not interrupted")
             .expect("a design");
@@ -510,7 +528,9 @@ fn regression_a_coil_at_the_outer_diameter_limit_was_refused() {
             "[search]\ncoil.inner_diameter_mm = {bores_mm}\ncoil.outer_diameter_mm = [25.0, 38.0]\n\
              coil.length_mm = [3.0, 100.0]\n"
         );
-        let all = problems(&design(&search), &request(), &[1.0], &OnAxis).expect("a search");
+        let all = problems(&design(&search), &request(), &[1.0], &OnAxis)
+            .expect("a search")
+            .all;
         // 14 layers of 0.7 mm are 19.6 mm.
         let bounds = all[0].bounds(&[bore_mm, 14.0, 50.0], None);
         all[0].judged(None, &bounds).excess() <= MET

@@ -9,7 +9,7 @@ mod result;
 pub(crate) mod tables;
 mod text;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 pub use result::*;
@@ -21,7 +21,9 @@ use crate::RunError;
 use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::array_search::problem::{ArrayProblem, Level, Objective, Physical, Physics, Room};
-use crate::coil::array_search::search::{Candidate, Found, Refused, Request, problems, run};
+use crate::coil::array_search::search::{
+    Candidate, Found, Problems, Refused, Request, problems, run,
+};
 use crate::coil::array_search::study::{Study, study};
 use crate::coil::limits::{self, LimitCheck};
 use crate::commands::evaluate::evaluate;
@@ -127,7 +129,10 @@ pub fn optimize_array(
     progress.begin("given design", 2);
     let before = before(design, shapes, physics, progress)?;
     progress.end();
-    let all = problems(design, &search, &before.full.merits, physics).map_err(refused)?;
+    let Problems {
+        all,
+        refused: impossible,
+    } = problems(design, &search, &before.full.merits, physics).map_err(refused)?;
     for problem in &all {
         problem.begin_with(&before.search, &before.full);
     }
@@ -153,13 +158,15 @@ pub fn optimize_array(
     found.interrupted |= progress.interrupted();
     let answer = |found: &Found<'_>, around: Option<Study>| {
         let inputs = inputs.clone();
-        result(
+        let mut answered = result(
             document,
             (shapes, inputs),
             request,
             physics,
             (&before, found, around, bound),
-        )
+        )?;
+        answered.warnings.extend(impossible.iter().cloned());
+        Ok(answered)
     };
     if !found.interrupted
         && let Ok(answered) = interruptible(|| answer(&found, around.clone()))
@@ -308,20 +315,26 @@ struct Checked {
 /// both miss alike, because nothing that is searched changes it, is a warning.
 fn checked(
     [best, given]: [&Design; 2],
-    (found, properties_given): (&Candidate, &Physical),
+    (problem, found, properties_given): (&ArrayProblem, &Candidate, &Physical),
     tolerance: Option<f64>,
     warnings: &mut Vec<String>,
 ) -> Result<Checked, RunError> {
     let evaluation = evaluate(best, Vec::new(), tolerance)?;
     warnings.extend(evaluation.warnings);
     let mut limits = evaluation.limits;
-    limits.extend(checks_of_shapes(best, &found.physical));
+    let of_shapes = checks_of_shapes(best, &found.physical);
+    let known = problem.bounds(&found.x, None);
+    let searched: BTreeSet<&str> = (known.iter().map(|bound| bound.key))
+        .chain(of_shapes.iter().map(|(key, _)| *key))
+        .collect();
+    limits.extend(of_shapes);
     limits.extend(missed_ranges(found));
     let mut limits_given = evaluate(given, Vec::new(), tolerance)?.limits;
     limits_given.extend(checks_of_shapes(given, properties_given));
     let missed = limits.iter().filter(|(_, check)| !check.met);
     let (unchanged, broken): (Vec<_>, Vec<_>) = missed.partition(|(key, check)| {
-        (limits_given.get(*key)).is_some_and(|given| given.value == check.value)
+        let given = limits_given.get(*key);
+        !searched.contains(*key) && given.is_some_and(|given| given.value == check.value)
     });
     let met = broken.is_empty();
     let keys: Vec<&str> = unchanged.iter().map(|(key, _)| key.as_ref()).collect();
@@ -396,7 +409,7 @@ fn result(
         if constant == Constant::Static(Criterion::Saturation) {
             warnings.extend(past_rendering(found, shapes, physics)?);
         }
-        let of = (&found.best, given);
+        let of = (found.problem, &found.best, given);
         checked(designs, of, request.tolerance, &mut warnings)?
     };
     let status = match (found.interrupted, checked.met) {

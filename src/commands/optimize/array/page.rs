@@ -23,10 +23,13 @@ pub fn html(result: &ArrayOptimization) -> String {
         [shape] => shape.shape.clone(),
         shapes => format!("the {} over {} shapes", result.objective, shapes.len()),
     };
-    let missed = if result.limits_met {
-        "every limit met"
-    } else {
-        "not every limit met"
+    let missed = match (
+        result.limits_met,
+        result.limits.values().all(|check| check.met),
+    ) {
+        (true, true) => "every limit met",
+        (true, false) => "every limit met that the search can change",
+        (false, _) => "not every limit met",
     };
     let text = format!(
         "Felt {} times as strongly as the given array ({of}), {missed}.",
@@ -224,7 +227,7 @@ fn variables(result: &ArrayOptimization, study: &Study) -> Section {
     body.element(
         "p class=\"note\"",
         "Bought: what is lost where this variable goes back to its given value and the others are \
-         searched again; needed: no array with the given value meets the limits. Within 1 %: how \
+         searched again; needed: none with the given value that meets the limits was found. Within 1 %: how \
          far it may move for a loss of one per cent, the others following.",
     );
     Section {
