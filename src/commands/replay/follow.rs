@@ -12,10 +12,11 @@ use super::renderer::{Renderer, Step};
 use super::summary::{Bounds, CurrentSums, Followed};
 use super::{Opened, PORTION};
 
-/// While currents follow a command forces are looked at first after this share of the shortest time constant,
-const FIRST: f64 = 1.0 / 16.0;
-/// then after times longer by this factor each.
-const GROWTH: f64 = 1.4;
+/// While currents follow a command forces are looked at over parts of the time, in the middle of each too; the first
+/// is this share of the shortest time constant,
+const FIRST: f64 = 1.0 / 8.0;
+/// and each longer than the one before by this factor.
+const GROWTH: f64 = 1.7;
 
 /// A step of one finger or two.
 pub(super) struct Steps {
@@ -178,8 +179,7 @@ impl Follower {
         Ok(found)
     }
 
-    /// Lets the currents follow a command while a position is held, and adds what they give meanwhile: each part of the
-    /// time counts half at either end.
+    /// Lets the currents follow a command while a position is held, and adds what they give meanwhile.
     fn follow(
         &self,
         found: &mut Followed,
@@ -189,6 +189,19 @@ impl Follower {
         counts: impl Fn(f64) -> f64,
     ) {
         let mut flowing = vec![0.0; command.len()];
+        let mut look = |found: &mut Followed, drive: &Drive, since_s: f64, weight_s: f64| {
+            drive.currents(&mut flowing);
+            if let Some(within) = &mut found.within {
+                self.add(within, at, at.trajectory.t_s[at.row] + since_s, &flowing);
+                let counts_s = counts(weight_s);
+                found.counts_s.push(counts_s);
+                found.currents.add(&flowing, counts_s);
+            }
+        };
+        let advance = |drive: &mut Drive, part_s: f64| match self.bandwidth_hz {
+            None => drive.hold(command, part_s),
+            Some(bandwidth_hz) => drive.track(command, part_s, bandwidth_hz),
+        };
         let [shortest_s, _] = drive.time_constants_s().unwrap_or_default();
         let pace_s = self.bandwidth_hz.map_or(shortest_s, |bandwidth_hz| {
             shortest_s.min(1.0 / (std::f64::consts::TAU * bandwidth_hz))
@@ -202,20 +215,14 @@ impl Follower {
             } else {
                 left_s
             };
-            drive.currents(&mut flowing);
-            if let Some(within) = &mut found.within {
-                self.add(within, at, at.trajectory.t_s[at.row] + since_s, &flowing);
-                let counts_s = counts(0.5 * (before_s + next_s));
-                found.counts_s.push(counts_s);
-                found.currents.add(&flowing, counts_s);
-            }
+            // Simpson's rule: what relaxes exponentially bends in the middle of a part.
+            look(found, drive, since_s, (before_s + next_s) / 6.0);
             if left_s <= 0.0 {
                 break;
             }
-            match self.bandwidth_hz {
-                None => drive.hold(command, next_s),
-                Some(bandwidth_hz) => drive.track(command, next_s, bandwidth_hz),
-            }
+            advance(drive, 0.5 * next_s);
+            look(found, drive, since_s + 0.5 * next_s, 4.0 * next_s / 6.0);
+            advance(drive, 0.5 * next_s);
             since_s = if next_s == left_s {
                 held_s
             } else {

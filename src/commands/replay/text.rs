@@ -183,8 +183,13 @@ fn currents(summary: &ReplaySummary) -> String {
     let currents = &summary.currents;
     let most = currents.max_a.iter().copied().fold(0.0, f64::max);
     let rms = currents.rms_a.iter().copied().fold(0.0, f64::max);
+    let farthest = if currents.max_sum_a < 0.0 {
+        ", the farthest from zero"
+    } else {
+        ""
+    };
     format!(
-        "at most {} a coil and {} in all; rms at most {} a coil",
+        "at most {} a coil and {} in all{farthest}; rms at most {} a coil",
         si(most, "A"),
         si(currents.max_sum_a, "A"),
         si(rms, "A")
