@@ -62,8 +62,8 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
             .map(|pair| 0.5 * (pair[0] + pair[1]))
             .collect()
     };
-    // A sideways component is zero in the middle of a cell that lies evenly about an axis; of many cells others show
-    // the error.
+    // A sideways component is zero in the middle of a cell that lies evenly about an axis, and relative to the values
+    // at its height a long cell's error peaks in its upper part; of many cells others show the error.
     let inside = |nodes: &[f64]| -> Vec<f64> {
         if nodes.len() > FEW {
             return middles(nodes);
@@ -75,6 +75,9 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
         }
     };
     let layers = |heights: Vec<f64>| -> Vec<f64> {
+        if z.len() <= FEW {
+            return heights;
+        }
         let top = heights.len().saturating_sub(HIGHEST);
         let decides = |(k, _): &(usize, f64)| *k < LOWEST || *k >= top;
         heights
@@ -85,14 +88,14 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
             .collect()
     };
     [
-        (inside(x), inside(y), middles(z)),
+        (inside(x), inside(y), inside(z)),
         // Where the errors along two axes have the sign that the third's has not.
-        (x.clone(), inside(y), middles(z)),
-        (inside(x), y.clone(), middles(z)),
+        (x.clone(), inside(y), inside(z)),
+        (inside(x), y.clone(), inside(z)),
         (inside(x), inside(y), z.clone()),
         (inside(x), y.clone(), z.clone()),
         (x.clone(), inside(y), z.clone()),
-        (x.clone(), y.clone(), middles(z)),
+        (x.clone(), y.clone(), inside(z)),
     ]
     .map(|(x_m, y_m, z_m)| Grid {
         x_m,

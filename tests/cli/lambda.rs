@@ -271,6 +271,42 @@ fn feedback_is_reported_beside_static_currents() {
     }
 }
 
+/// Where the only coil's force changes its sign a driver that reverses gives none: a lambda of 1e-16 N/m was stated.
+#[test]
+fn a_shell_with_a_place_without_force_has_no_lambda() {
+    let place = Place::new();
+    place.write(
+        "one.toml",
+        "name = \"one\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 30\n[wire]\n\
+         diameter_mm = 0.7\n[supply]\ncurrent_max_a = 2\ncurrent_min_a = -2\n",
+    );
+    place.write(
+        "beside.toml",
+        "name = \"beside\"\nprimitive = \"flat\"\nheight_mm = 26\n[points]\nx_mm = [-20, 20, 5]\n\
+         y_mm = [-20, 20, 5]\n",
+    );
+    let args = [
+        "lambda",
+        "one.toml",
+        "beside.toml",
+        "--feedback",
+        "--shell",
+        "11mm",
+    ];
+    let result = place
+        .run(&[&args[..], &["--format", "json"]].concat())
+        .ends(0)
+        .json();
+    let shell = &result["feedback"]["shell"];
+    assert!(shell["lambda_n_per_m"].is_null(), "{shell}");
+    assert!(
+        shell["reason"]
+            .to_string()
+            .contains("within reach at point"),
+        "{shell}"
+    );
+}
+
 #[test]
 fn shells_that_cannot_be_are_refused() {
     let place = few_points();

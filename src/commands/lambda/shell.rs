@@ -20,6 +20,8 @@ const MOST_LAYERS: f64 = 500.0;
 const TOLERANCE: f64 = 1e-3;
 /// Gaps are split at most so many times.
 const SPLITS: usize = 20;
+/// A lambda below this part of that of the layers is none: a force that changes its sign is zero in between.
+const NOTHING: f64 = 1e-9;
 
 impl PosedProblem<'_> {
     /// The force constant that can be given within `reach_m` above and below the surface, and its error.
@@ -95,8 +97,18 @@ impl PosedProblem<'_> {
         mut open: Vec<Gap>,
     ) -> Result<Between, RunError> {
         let mut found = Between::default();
+        let of_layers = all.largest().map_or(0.0, |found| found.lambda_n_per_m);
         for split in 0.. {
-            let smallest = all.largest().map_or(0.0, |found| found.lambda_n_per_m);
+            let decided = all.largest().ok();
+            let smallest = decided.map_or(0.0, |found| found.lambda_n_per_m);
+            if let Some(decided) = decided
+                && smallest < NOTHING * of_layers
+            {
+                let [least_n, most_n] = [vec![0.0], vec![0.0]];
+                let felt_m = [self.problem.height_m[decided.point]];
+                all.add_over(&felt_m, &Reachable { least_n, most_n }, |_| decided.point);
+                break;
+            }
             let known = |gap: &Gap| gap.least_n_per_m >= (1.0 - TOLERANCE) * smallest;
             let done = |gap: &Gap| split == SPLITS || smallest == 0.0 || known(gap);
             let (closed, split): (Vec<Gap>, Vec<Gap>) = open.into_iter().partition(done);
