@@ -338,7 +338,7 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
         "I / A",
         "coil 8",
         "given - lambda h / mN",
-        "requested / mN",
+        "given upward / mN",
         "with feedback",
         "maxmin",
     ] {
