@@ -315,3 +315,21 @@ fn a_choice_of_one_coil_has_no_pitch() {
         .collect();
     assert!(coils.contains(&1) && coils.contains(&2), "{coils:?}");
 }
+
+/// That a file may not be replaced was said after the search alone.
+#[test]
+fn a_file_that_stands_in_the_way_is_named_before_the_search() {
+    let place = Place::new();
+    let search = rows_of_coils(&place, "[2, 3]", "");
+    let without_force: Vec<&str> = search
+        .iter()
+        .copied()
+        .filter(|arg| *arg != "--force")
+        .collect();
+    let readable = &without_force[..without_force.len() - 2];
+    place.run(readable).ends(0);
+    place
+        .run(readable)
+        .ends(0)
+        .says(&["best.toml exists: without --force it is kept"]);
+}

@@ -136,6 +136,16 @@ impl ArrayFlags {
         let mut inputs = vec![document.input.clone()];
         inputs.extend(shapes.iter().filter_map(|shape| shape.input.clone()));
         let outputs = self.outputs(shared, &document, &inputs)?;
+        let files = [shared.out, self.front.as_ref()].into_iter().flatten();
+        let there = files
+            .map(FileArgument::as_given)
+            .filter(|path| path.is_file());
+        for path in there.filter(|_| !shared.force) {
+            printer.notice(&format!(
+                "{} exists: without --force it is kept, unless the same comes out again",
+                shown_path(path)
+            ));
+        }
         let bar = begin(printer);
         let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
         physics.remember(self.earlier()?);
