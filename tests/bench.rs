@@ -323,7 +323,7 @@ fn the_files_hold_every_run_and_fit_their_schema() {
     // The report names the parts that the scene lacks.
     let why = reported["left_out"].to_string();
     assert!(
-        why.contains("steel resolution") && why.contains("no [core]"),
+        why.contains("steel resolution") && why.contains("no steel"),
         "{why}"
     );
     // The same inputs may replace their files, others may not.
