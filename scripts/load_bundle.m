@@ -580,10 +580,10 @@ function [d, nearest] = finish_nearest(d, n)
     least = 1e-6 * max([sqrt(conductance) .* sqrt(sum(more .^ 2, 2)); 0]);
     shared = zeros(numel(free), 1);
     if n == 4 && ~isempty(free)
-        mean = sum(more .* conductance, 1) / sum(conductance);
-        more = more - mean;
+        middle = sum(more .* conductance, 1) / sum(conductance);
+        more = more - middle;
         shared = left(4) * conductance / sum(conductance);
-        left(1:3) = left(1:3) - mean.' * left(4);
+        left(1:3) = left(1:3) - middle.' * left(4);
     end
     axes = spanned(more .* sqrt(conductance), least);
     y = zeros(3, 1);
@@ -610,11 +610,11 @@ function axes = spanned(forces, least)
     axes = zeros(3, 0);
     while size(axes, 2) < 3
         rest = forces - (forces * axes) * axes.';
-        [length, at] = max(sqrt(sum(rest .^ 2, 2)));
-        if isempty(length) || ~(length > least)
+        [longest, at] = max(sqrt(sum(rest .^ 2, 2)));
+        if isempty(longest) || ~(longest > least)
             return
         end
-        axes(:, end + 1) = rest(at, :).' / length; %#ok<AGROW>
+        axes(:, end + 1) = rest(at, :).' / longest; %#ok<AGROW>
     end
 end
 

@@ -346,7 +346,7 @@ fn a_force_without_currents_narrows_the_span() {
     assert!((most.lambda_n_per_m - 3.0).abs() < 1e-12 && most.layer == 2);
 }
 
-/// Largest lambdas along a line of places where forces are given by height, at `steps` gaps.
+/// Largest lambdas at heights `at_m`, where `force` gives each coil's force per ampere.
 fn along(
     force: impl Fn(f64) -> [f64; 2],
     lower: [f64; 2],
