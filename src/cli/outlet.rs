@@ -28,16 +28,18 @@ impl Outlet {
 }
 
 /// Gives what was computed, although a stop is requested, which would lose it: `write` the outputs of each kind,
-/// then `print` the summary where they left place for it. A stop ends the wait for a reader, when every file is whole.
+/// then `print` the summary where they left place for it. A file that is refused costs neither the other outputs
+/// nor the summary. A stop ends the wait for a reader, when every file is whole.
 ///
 /// # Errors
-/// Those of `write` and `print`.
+/// Those of `write` and `print`; the first, where there are several.
 pub fn give<T>(
     mut write: impl FnMut(Outlet) -> Result<Stream, Failure>,
     print: impl FnOnce(Stream) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     to_its_end(|| {
-        write(Outlet::File)?;
-        for_a_reader(|| print(write(Outlet::Reader)?))
+        let files = write(Outlet::File);
+        let printed = for_a_reader(|| print(write(Outlet::Reader)?));
+        files.and(printed)
     })
 }

@@ -497,6 +497,13 @@ fn another_file_is_not_replaced() {
     let ran = place.run(&["optimize", SEED, "--out", "-"]).ends(0);
     assert_eq!(ran.out.as_bytes(), first);
     assert!(ran.err.contains("proven best"), "{}", ran.err);
+    // Another result is kept, and the new one shown: it may have taken hours.
+    let head = first.split_inclusive(|&byte| byte == b'\n').next().unwrap();
+    let other = [head, b"schema_version = 1\n"].concat();
+    place.write("mine.toml", &other);
+    let ran = place.run(&args).ends(4).says(&["E405", "--force"]);
+    assert!(ran.out.contains("proven best"), "{}", ran.out);
+    assert_eq!(place.read("mine.toml"), other);
 }
 
 #[test]
