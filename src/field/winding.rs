@@ -403,20 +403,26 @@ fn away_from_zero(value: f64, limit: f64, sign: f64) -> f64 {
     }
 }
 
-/// Half-infinite sheet's B_z over mu_0 K: a u / (pi (a + r) s) cel(d/s, g^2, 1, g).
+/// Half-infinite sheet's B_z over mu_0 K: a u / (pi (a + r) s) cel(d/s, g^2, 1, g); in the sheet, where it
+/// jumps, the mean of both sides.
 pub(super) fn sheet_end(a: f64, r: f64, offset: f64, u: f64) -> f64 {
     let sum = a + r;
     if sum == 0.0 {
         return 0.5 * u.signum();
     }
+    if u == 0.0 {
+        return 0.0;
+    }
     let s = sum.hypot(u);
     let kc = offset.hypot(u) / s;
     let g = offset / sum;
-    let value = if g >= 0.0 {
-        // Inside cel's domain: 0 < kc, 0 < g^2 (nodes never lie on a = r).
-        cel(kc, g * g, 1.0, g).unwrap_or(0.0)
-    } else {
+    let value = if g < 0.0 {
         cel_outside(kc, 4.0 * a * r / (s * s), -g)
+    } else {
+        // The part of g alone jumps; a square of it below the least number is that of zero.
+        let square = g * g;
+        let (p, b) = if square == 0.0 { (1.0, 1.0) } else { (square, g) };
+        cel(kc, p, 1.0, b).unwrap_or(f64::NAN)
     };
     a * u / (PI * sum * s) * value
 }

@@ -113,8 +113,7 @@ impl ArrayCost {
         Self {
             bytes: NUMBER_BYTES * (matrices + potentials + steps) + PAIR_BYTES * cores * cores,
             operations: SOLUTIONS
-                * (STEPS * 2.0 * size * size * cores * cores * drives / QUICKER
-                    + 10.0 * matrices),
+                * (STEPS * 2.0 * size * size * cores * cores * drives / QUICKER + 10.0 * matrices),
             least_error,
         }
     }
