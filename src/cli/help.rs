@@ -19,13 +19,16 @@ pub enum Codes {
     Verifying,
     /// Writes files that need no input.
     Pages,
+    /// Writes documents with values that are given.
+    Documents,
     /// Measures, writes files, reads nothing.
     Measuring,
 }
 
-const BAD_INPUT: &str = "3    a bad input file: every fault is reported with its place";
+const BAD_INPUT: &str = "3    a bad input file; faults are reported with their places";
 const UNMET_OR_UNWRITTEN: &str =
     "4    a result that does not meet the request; or an output that exists or cannot be written";
+const UNWRITTEN: &str = "4    an output exists or cannot be written";
 const INTERRUPTED: &str = "130  interrupted";
 const KEPT: &str = "130  interrupted; what was finished is kept";
 
@@ -46,7 +49,8 @@ impl Codes {
                 KEPT,
             ],
             Self::Verifying => &["3    not a bundle", "5    a check failed", INTERRUPTED],
-            Self::Pages => &["4    an output exists or cannot be written"],
+            Self::Pages => &[UNWRITTEN],
+            Self::Documents => &["3    a value that a design refuses", UNWRITTEN],
             Self::Measuring => &[
                 "4    an output exists or cannot be written; or a measurement failed",
                 "5    a case of the catalogue failed",
@@ -79,7 +83,7 @@ pub fn main() -> String {
     "Exit codes:
   0    done; also when the reader of a pipe goes away
   2    wrong usage; also a raw surface without --unit
-  3    a bad input file: every fault is reported with its place
+  3    a bad input file; faults are reported with their places
   4    a result that does not meet the request; or an output that exists or cannot be written
   5    a verification failed
   130  interrupted; what was finished is kept

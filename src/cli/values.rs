@@ -323,11 +323,11 @@ const LARGEST_CONSTANT_N_PER_M: f64 = 1e6;
 /// A force constant, N/m.
 pub fn force_constant(text: &str) -> Result<f64, String> {
     let value = number(text)?;
-    if (0.0..=LARGEST_CONSTANT_N_PER_M).contains(&value) {
+    if value > 0.0 && value <= LARGEST_CONSTANT_N_PER_M {
         Ok(value)
     } else {
         Err(format!(
-            "invalid force constant {value:?}: expected 0 to {LARGEST_CONSTANT_N_PER_M} N/m (1 kN at a height of \
+            "invalid force constant {value:?}: expected above 0, at most {LARGEST_CONSTANT_N_PER_M} N/m (1 kN at a height of \
              1 mm), like 2.0"
         ))
     }
@@ -573,7 +573,8 @@ mod tests {
         }
         assert_eq!(tolerance("1e-15").unwrap(), 1e-15);
         assert!(threads("0").is_err() && threads("-1").is_err() && threads("2").is_ok());
-        assert!(jnd("0").is_err() && force_constant("-2").is_err() && length("-1").is_err());
+        assert!(jnd("0").is_err() && length("-1").is_err());
+        assert!(force_constant("-2").is_err() && force_constant("0").is_err());
         assert!(unit("inches").is_err());
     }
 }

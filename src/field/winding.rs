@@ -421,7 +421,11 @@ pub(super) fn sheet_end(a: f64, r: f64, offset: f64, u: f64) -> f64 {
     } else {
         // The part of g alone jumps; a square of it below the least number is that of zero.
         let square = g * g;
-        let (p, b) = if square == 0.0 { (1.0, 1.0) } else { (square, g) };
+        let (p, b) = if square == 0.0 {
+            (1.0, 1.0)
+        } else {
+            (square, g)
+        };
         cel(kc, p, 1.0, b).unwrap_or(f64::NAN)
     };
     a * u / (PI * sum * s) * value

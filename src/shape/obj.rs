@@ -59,7 +59,7 @@ impl Reader {
         let mut vertex = [0.0; 3];
         for coordinate in &mut vertex {
             let word = words.next();
-            let word = word.ok_or("a vertex has three coordinates; here are fewer")?;
+            let word = word.ok_or("a vertex has fewer than three coordinates")?;
             *coordinate = self.numbers.read(word)?;
         }
         self.vertices.push(vertex);
@@ -102,7 +102,7 @@ impl Reader {
         let corners = self.faces.corners();
         if corners < 3 {
             return Err(format!(
-                "a face has at least three corners; here are {corners}"
+                "a face of {corners} corners, expected three or more"
             ));
         }
         self.faces.end_face(line);

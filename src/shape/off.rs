@@ -67,9 +67,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         let (number, words) = rest.next()?;
         let as_fault = |what: String| ReadError::new(Place::Line(number), what);
         let [x, y, z, ..] = words[..] else {
-            return Err(as_fault(
-                "a vertex has three coordinates; here are fewer".into(),
-            ));
+            return Err(as_fault("a vertex has fewer than three coordinates".into()));
         };
         let mut point = [0.0; 3];
         for (slot, word) in point.iter_mut().zip([x, y, z]) {

@@ -528,3 +528,12 @@ fn a_name_that_no_file_may_have_is_refused_with_what_to_do() {
         .says(&["the name is too long; choose a shorter one"]);
     assert!(!place.path(&name).exists());
 }
+
+#[test]
+fn a_name_that_the_summary_takes_is_wrong_usage() {
+    let place = Place::new();
+    place
+        .run(&["discretize", "shapes/flat.toml", "--out", "points.json"])
+        .ends(2)
+        .says(&["E201", "the summary takes the ending .json"]);
+}

@@ -99,12 +99,18 @@ fn obj_faults_have_their_line() {
             "f 1 2 -4\n",
             "line 4: a face has the index -4, but only 3 vertices",
         ),
-        ("f 1 2\n", "line 4: a face has at least three corners"),
+        (
+            "f 1 2\n",
+            "line 4: a face of 2 corners, expected three or more",
+        ),
         ("f 1 2 x/3\n", "line 4: expected an index, found `x/3`"),
         ("f 1 2 99999999999999999999\n", "expected an index"),
         ("f 1 2 9223372036854775807\n", "9223372036854775807"),
         ("f 1 2 -9223372036854775808\n", "-9223372036854775808"),
-        ("v 1 2\n", "line 4: a vertex has three coordinates"),
+        (
+            "v 1 2\n",
+            "line 4: a vertex has fewer than three coordinates",
+        ),
         ("v 1 2 nan\n", "line 4: a coordinate is `nan`"),
         (
             "v 1 2 1e999\n",

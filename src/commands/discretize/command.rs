@@ -211,7 +211,8 @@ impl Discretize {
         if let FileArgument::Path(path) = &self.out
             && !atomic::is_stream(path)
         {
-            let files = TableFiles::new(path, self.writing.force, inputs)?;
+            let files = TableFiles::new(path, self.writing.force, inputs);
+            let files = files.map_err(|wrong| Failure::Usage(wrong.to_string()))?;
             outputs.extend(files.paths());
         }
         let plot = self.plot.as_ref().map(|file| {

@@ -26,7 +26,7 @@ use crate::cli::values::{self, FileArgument, setting};
 /// meaning. At a terminal, without TEMPLATE, what to begin with is asked. Files that differ are replaced
 /// only with --force.
 #[derive(Debug, Args)]
-#[command(after_long_help = page(Codes::Pages, &[
+#[command(after_long_help = page(Codes::Documents, &[
     ("fluxform init desk", "a small array in air, and a plate"),
     ("fluxform init seed --name mine --object wedge --out mine",
      "the reference array and a wedge, in a folder"),

@@ -34,8 +34,8 @@ use crate::scene::cost;
 /// keep both errors together within it, relative to the largest |dBz/dz| at the height.
 ///
 /// --vfield and --mpem write calibration files of mag_manip, ETH Zurich's runtime for magnetic
-/// manipulation: the field on nodes that span the workspace and one step more, whose error between
-/// the nodes is stated, and sources on the coils' axes, whose error at places that the fit did not
+/// manipulation: the field on nodes that span the workspace, and one step more where no coil is in the way,
+/// whose error between the nodes is stated, and sources on the coils' axes, whose error at places that the fit did not
 /// see is stated; the latter ends with code 4 where it exceeds --mpem-tolerance.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Writing, &[

@@ -105,7 +105,7 @@ fn compact_steel(table: &CompactSteel) -> String {
 fn vector_field(made: &VectorFieldSummary) -> String {
     let steps = made.step_m.map(mm).join(", ");
     format!(
-        "{}: {n} x {n} x {n} nodes {steps} apart, one step beyond the workspace",
+        "{}: {n} x {n} x {n} nodes {steps} apart, one step beyond the workspace where no coil is in the way",
         made.file,
         n = made.nodes,
     )
