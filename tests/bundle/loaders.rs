@@ -26,6 +26,7 @@ pub fn trials() -> Vec<Trial> {
         ],
         needs::numpy() => [
             python_gives_the_forces_of_the_library,
+            python_says_what_it_cannot_answer,
             extreme_limits_give_the_same_currents_in_python,
         ],
         needs::c_compiler() => [
@@ -297,6 +298,42 @@ fn the_forces_of_the_library_are_those_of_the_field() {
 
 fn python_gives_the_forces_of_the_library() {
     forces_on_samples(Some(&Loader::python()));
+}
+
+/// It ended with a fault of Python's or numpy's own words.
+fn python_says_what_it_cannot_answer() {
+    const SCRIPT: &str = "\
+import sys
+sys.path.insert(0, sys.argv[1])
+from load_bundle import Bundle, BundleError
+bundle = Bundle(sys.argv[2])
+for wrong in ([0, 0], [], [[0, 0, 0.03, 1]]):
+    try:
+        bundle.currents(wrong)
+    except ValueError as error:
+        print(error)
+bundle.lambda_n_per_m = None
+for ask in (bundle.currents, bundle.requested_force):
+    try:
+        ask([0, 0, 0.03])
+    except BundleError as error:
+        print(error)
+";
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("bundle");
+    sample(false, [3; 3]).write(&target, false).unwrap();
+    let mut python = Command::new("python3");
+    python.args(["-B", "-c", SCRIPT]);
+    python.arg(root().join("src/python/fluxform")).arg(&target);
+    let ran = Ran::of(python.output().unwrap()).ends(0);
+    let said = |what: &str| ran.out.matches(what).count();
+    assert_eq!(
+        said("expected x, y, z in m or rows of them"),
+        3,
+        "{}",
+        ran.out
+    );
+    assert_eq!(said("the bundle has no force constant"), 2, "{}", ran.out);
 }
 
 fn c_gives_the_forces_of_the_library() {

@@ -184,7 +184,7 @@ class Bundle:
 
     def inside(self, points_m):
         """True for each point (x, y, z in m) within the map's grid."""
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m)
         axes = [self.map[key] for key in ("x_m", "y_m", "z_m")]
         low = np.array([axis[0] for axis in axes])
         high = np.array([axis[-1] for axis in axes])
@@ -229,14 +229,14 @@ class Bundle:
     def requested_force(self, points_m):
         """The force vector requested [N] at x, y: lambda times the height, upward unless the bundle requests
         another direction; zero where there is no surface."""
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m, "x, y")
         height, direction = self._on_surface(points_m)
-        size = self.lambda_n_per_m * np.nan_to_num(height)
+        size = self._force_constant() * np.nan_to_num(height)
         return size[:, None] * np.nan_to_num(direction)
 
     def passive_force(self, points_m):
         """What the unpowered steel adds to the force [N], up positive; zero outside or without it."""
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m)
         result = np.zeros((len(points_m), 1))
         if "passive_force_n" in self.map:
             self._fill(self.map["passive_force_n"][None], points_m, result, [0])
@@ -244,7 +244,7 @@ class Bundle:
 
     def height(self, points_m):
         """Height of the surface [m] at x, y (further columns are passed over); NaN where none is."""
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m, "x, y")
         if "height_m" not in self.map:
             raise BundleError("map.npz holds no heights: it is of a schema before 1.2; calibrate again")
         return self._on_surface(points_m)[0]
@@ -272,6 +272,11 @@ class Bundle:
         direction = self.map["requested_direction"]
         return height, np.stack([between(direction[..., k]) for k in range(3)], axis=1)
 
+    def _force_constant(self):
+        if self.lambda_n_per_m is None:
+            raise BundleError("the bundle has no force constant: nothing can be rendered")
+        return self.lambda_n_per_m
+
     def currents(self, points_m, robust=False):
         """Currents [A] of least power whose force is lambda times the height (eq. 8), or the nearest; where
         `robust`, those of the least expected error under the uncertainties that the bundle was made with.
@@ -280,17 +285,16 @@ class Bundle:
         answers: "ok", "saturated" or "outside" (of the map: no currents). Of bundles that request a
         force vector the force has three columns.
         """
-        if self.lambda_n_per_m is None:
-            raise BundleError("the bundle has no force constant: nothing can be rendered")
+        lambda_n_per_m = self._force_constant()
         if robust:
             return self._robust_currents(points_m)
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m)
         inside = self.inside(points_m)
         if "requested_direction" in self.map:
             return self._vector_currents(points_m, inside)
         per_ampere = self.force_per_ampere(points_m)
         passive = self.passive_force(points_m)
-        wanted = self.lambda_n_per_m * np.nan_to_num(self.height(points_m))
+        wanted = lambda_n_per_m * np.nan_to_num(self.height(points_m))
         currents = np.zeros((len(points_m), self.coil_count))
         answers = np.full(len(points_m), "outside", dtype=object)
         for k in np.flatnonzero(inside):
@@ -321,7 +325,7 @@ class Bundle:
             from .expected_error import ExpectedError, places
         except ImportError:
             from expected_error import ExpectedError, places
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m)
         currents, force, answers = self.currents(points_m)
         vector = "requested_direction" in self.map
         per_ampere = self.force_vectors_per_ampere if vector else self.force_per_ampere
@@ -365,7 +369,7 @@ class Bundle:
             )
 
     def _interpolate(self, values, points_m):
-        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        points_m = _rows(points_m)
         result = np.zeros((len(points_m), self.coil_count))
         self._fill(values, points_m, result, self.map["coil"])
         return result
@@ -474,6 +478,16 @@ def _finite(word):
 
 def _json(content):
     return json.loads(content.decode("utf-8"), parse_constant=_no_number, parse_float=_finite)
+
+
+def _rows(points_m, what="x, y, z"):
+    """Positions as rows; of x, y there may be more columns."""
+    points_m = np.asarray(points_m, dtype=float)
+    columns = what.count(",") + 1
+    found = points_m.shape[-1] if points_m.ndim in (1, 2) else 0
+    if found < columns or (columns == 3 and found > 3):
+        raise ValueError(f"expected {what} in m or rows of them, found an array of shape {points_m.shape}")
+    return np.atleast_2d(points_m)
 
 
 def _stencil(nodes, positions):
