@@ -28,7 +28,7 @@ impl Outlet {
 }
 
 /// Gives what was computed, although a stop is requested, which would lose it: `write` the outputs of each kind,
-/// then `print` the summary where they left place for it. A file that is refused costs neither the other outputs
+/// then `print` the summary where they left place for it. A file that is refused costs neither what a reader takes
 /// nor the summary. A stop ends the wait for a reader, when every file is whole.
 ///
 /// # Errors
