@@ -143,7 +143,10 @@ fn arguments_are_validated_with_their_meaning() {
     lambda(&["--jnd", "7"]).says(&["at most 1, like 7% or 0.07"]);
     lambda(&["--at", "-2"]).says(&["invalid force constant -2"]);
     // Its squares are no doubles: the result could not be written.
-    lambda(&["--at", "1e308"]).says(&["invalid force constant 1e308", "0 to 1000000 N/m"]);
+    lambda(&["--at", "1e308"]).says(&[
+        "invalid force constant 1e308",
+        "above 0, at most 1000000 N/m",
+    ]);
     lambda(&["--threads", "0"]).says(&["from 1 to 1024"]);
     lambda(&["--criterion", "best"]).says(&["linear, jnd, saturation, maxmin"]);
     let raw = |more: &[&str]| {

@@ -5,7 +5,7 @@
 //! gathered from cells, rings about discs, sides of cylinders.
 
 use super::face::{Curve, Face, Point, SAME_M};
-use super::plate::{Fault, is_apart};
+use super::plate::{Fault, is_apart, widened};
 use super::prisms::{Prism, from_rectangle_m};
 use super::round_faces::{Cell, Rim, Site, cylinder_side, disc};
 
@@ -520,7 +520,8 @@ impl<'a> Level<'a> {
         let marks: Vec<&Site> = prisms.flat_map(|prism| &prism.marks).collect();
         for mark in &marks {
             let real = self.spots.iter().filter(|spot| !spot.is_mark);
-            let clear = |site: &Site| site.holds(mark) || is_apart(site, mark);
+            // A narrow ring between a rim and a mark would stand for the edge, and the disc within end coarsely.
+            let clear = |site: &Site| site.holds(&widened(mark)) || is_apart(site, mark);
             let cut = |other: &&Site| !other.is(mark) && other.apart_m(mark) < SAME_M;
             if !real.map(|spot| &spot.site).all(clear) || marks.iter().copied().any(|m| cut(&m)) {
                 continue;
@@ -579,12 +580,13 @@ impl<'a> Level<'a> {
     fn add_faces(&self, out: &mut Vec<Bound>) -> Result<(), Fault> {
         let (of, plane) = (self.of, self.plane);
         let height_m = of.planes[2][plane];
+        let room = |spot: &Spot| [spot.site, widened(&spot.site)][usize::from(spot.is_mark)];
         for rectangle in of.rectangles(2, plane, self.whole()?) {
             let [[u0, u1], [v0, v1]] = rectangle;
             let [xs, ys, _] = &of.planes;
             let corners = [[xs[u0], ys[v0], height_m], [xs[u1], ys[v1], height_m]];
             let top = self.spots.iter().filter(|spot| spot.parent.is_none());
-            let sites: Vec<&Spot> = top.filter(|spot| is_within(&spot.site, corners)).collect();
+            let sites: Vec<&Spot> = top.filter(|spot| is_within(&room(spot), corners)).collect();
             if sites.is_empty() {
                 of.add_rectangle(2, plane, rectangle, out);
                 continue;

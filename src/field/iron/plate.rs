@@ -122,6 +122,14 @@ pub(super) fn is_apart(hole: &Site, other: &Site) -> bool {
     hole.apart_m(other) >= LEAST_LEFT * hole.radius_m
 }
 
+/// A site with the steel about it that is resolved.
+pub(super) fn widened(site: &Site) -> Site {
+    Site {
+        radius_m: (1.0 + LEAST_LEFT) * site.radius_m,
+        ..*site
+    }
+}
+
 impl Plate {
     /// Refuses holes that cut its edge, each other or one of the `feet` of cores on it, or nearly.
     pub(super) fn check_holes(&self, feet: &[Site]) -> Result<(), Fault> {
