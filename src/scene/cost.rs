@@ -459,6 +459,26 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_cost_of_coupled_cores_is_that_of_the_recorded_measurements() {
+        let text = include_str!("../../results/bench/scaling/scaling.csv");
+        let seed = include_str!("../../designs/seed.toml");
+        for side in [3, 4, 6, 15] {
+            let row = format!("coupled-array,coils,{},1,", side * side);
+            let row = text.lines().find_map(|line| line.strip_prefix(&row));
+            let seconds = row.unwrap().split(',').next().unwrap();
+            let of_side = ["rows", "columns"]
+                .into_iter()
+                .fold(seed.to_owned(), |text, key| {
+                    text.replace(&format!("\n{key} = 3"), &format!("\n{key} = {side}"))
+                });
+            let read = Design::from_toml(&of_side, "d.toml".as_ref(), Need::CALIBRATE);
+            let cost = of_steel(&read.unwrap().0, None).unwrap();
+            let share = cost.cpu_seconds / seconds.parse::<f64>().unwrap();
+            assert!((0.33..3.0).contains(&share), "{side} x {side}: {share}");
+        }
+    }
+
     /// `time fluxform lambda` of this design: two minutes of processor time.
     #[test]
     fn the_pull_of_a_plate_is_long() {

@@ -229,7 +229,7 @@ class Bundle:
     def requested_force(self, points_m):
         """The force vector requested [N] at x, y: lambda times the height, upward unless the bundle requests
         another direction; zero where there is no surface."""
-        points_m = _rows(points_m, "x, y")
+        points_m = _rows(points_m, further=True)
         height, direction = self._on_surface(points_m)
         size = self._force_constant() * np.nan_to_num(height)
         return size[:, None] * np.nan_to_num(direction)
@@ -244,7 +244,7 @@ class Bundle:
 
     def height(self, points_m):
         """Height of the surface [m] at x, y (further columns are passed over); NaN where none is."""
-        points_m = _rows(points_m, "x, y")
+        points_m = _rows(points_m, further=True)
         if "height_m" not in self.map:
             raise BundleError("map.npz holds no heights: it is of a schema before 1.2; calibrate again")
         return self._on_surface(points_m)[0]
@@ -480,12 +480,12 @@ def _json(content):
     return json.loads(content.decode("utf-8"), parse_constant=_no_number, parse_float=_finite)
 
 
-def _rows(points_m, what="x, y, z"):
-    """Positions as rows; of x, y there may be more columns."""
+def _rows(points_m, further=False):
+    """Positions x, y, z [m] as rows; where `further`, of x, y and any columns more."""
     points_m = np.asarray(points_m, dtype=float)
-    columns = what.count(",") + 1
     found = points_m.shape[-1] if points_m.ndim in (1, 2) else 0
-    if found < columns or (columns == 3 and found > 3):
+    if found < 2 or not (further or found == 3):
+        what = "x, y" if further else "x, y, z"
         raise ValueError(f"expected {what} in m or rows of them, found an array of shape {points_m.shape}")
     return np.atleast_2d(points_m)
 
