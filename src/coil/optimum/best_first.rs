@@ -117,13 +117,13 @@ pub(super) struct Strongest<'a, C: CoilSets> {
 }
 
 impl<'a, C: CoilSets> Strongest<'a, C> {
-    /// Searches among `problems`' coils, one of which has `best_ln`, taking at most `budget` sets apart.
+    /// Searches among `problems`' coils, some of which are `known`, taking at most `budget` sets apart.
     ///
     /// # Errors
     /// Interruption.
     pub fn of(
         problems: &'a [C],
-        best_ln: f64,
+        known: Vec<Vec<Leaf>>,
         budget: usize,
         progress: &dyn Progress,
     ) -> Result<Self, Interrupted> {
@@ -131,12 +131,19 @@ impl<'a, C: CoilSets> Strongest<'a, C> {
             problems,
             queue: BinaryHeap::new(),
             order: 0,
-            best_ln,
+            best_ln: f64::NEG_INFINITY,
             listed: Listed::default(),
             listed_pairs: BTreeSet::new(),
             bound_ln: f64::NEG_INFINITY,
             cells: 0,
         };
+        let known = known.into_iter().map(|coils| Parts {
+            coils,
+            ..Parts::default()
+        });
+        known
+            .enumerate()
+            .for_each(|(of, parts)| search.add(of, parts));
         for (of, problem) in problems.iter().enumerate() {
             progress.check()?;
             let parts = problem.all(search.enough_ln());

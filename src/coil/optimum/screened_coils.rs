@@ -74,9 +74,10 @@ pub(super) fn optimise(
         .collect();
     complete &= coils.iter().all(|coils| coils.count() <= PAIRS);
     progress.begin("wind", coils.len() as u64);
-    let near = coils.iter().filter_map(ScreenedCoils::next_to_continuous);
-    let best_ln = near.fold(f64::NEG_INFINITY, |most, leaf| most.max(leaf.ln_force));
-    let search = Strongest::of(&coils, best_ln, PAIRS as usize, progress)?;
+    let near = coils
+        .iter()
+        .map(|coils| Vec::from_iter(coils.next_to_continuous()));
+    let search = Strongest::of(&coils, near.collect(), PAIRS as usize, progress)?;
     progress.end();
     let certificate = |_: &BestCoil| Certificate {
         kind: if complete {

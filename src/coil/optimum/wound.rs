@@ -6,7 +6,7 @@
 use super::best_first::Strongest;
 use super::bounded_coils::{BoundedCoils, next_to_continuous};
 use super::branch_and_bound::{self, GAP};
-use super::candidates::{self, SHARE, around_optimum};
+use super::candidates::{self, Leaf, SHARE, around_optimum};
 use super::local_searches::{self, Settings, Solved};
 use super::model::CoilModel;
 use super::nearest_whole;
@@ -45,25 +45,32 @@ pub fn optimise_wound(
         .iter()
         .filter(|solved| solved.contradiction.is_none())
         .collect();
-    let near = open.iter().flat_map(|solved| next_to_continuous(solved));
-    let best_ln = near.fold(f64::NEG_INFINITY, |most, leaf| most.max(leaf.ln_force));
+    let near: Vec<Vec<Leaf>> = open
+        .iter()
+        .map(|solved| next_to_continuous(solved))
+        .collect();
+    let forces_ln = near.iter().flatten().map(|leaf| leaf.ln_force);
+    let best_ln = forces_ln.fold(f64::NEG_INFINITY, f64::max);
     // Without a coil to compare with, any positive force counts.
     let reach_n = best_ln.max(-600.0).exp() * (1.0 - SHARE);
     let mut complete = true;
-    let mut coils = Vec::new();
-    for solved in &open {
+    let (mut coils, mut known) = (Vec::new(), Vec::new());
+    for (solved, near) in open.iter().zip(near) {
         let domain = branch_and_bound::finite_domain(&solved.problem, reach_n).or_else(|| {
             // Nothing bounds the coil for certain: what is near the continuous optimum.
             complete = false;
             around_optimum(solved)
         });
         match domain.and_then(|domain| BoundedCoils::new(solved, domain, best_ln)) {
-            Some(bounded) => coils.push(bounded),
+            Some(bounded) => {
+                coils.push(bounded);
+                known.push(near);
+            }
             None => complete = false,
         }
     }
     progress.begin("wind", open.len() as u64);
-    let search = Strongest::of(&coils, best_ln, settings.cells / 4, progress)?;
+    let search = Strongest::of(&coils, known, settings.cells / 4, progress)?;
     progress.end();
     let certificate = |best: &BestCoil| {
         let top_ln = best.force_n.ln();
@@ -81,8 +88,13 @@ pub fn optimise_wound(
             cells: search.cells,
         }
     };
-    Ok(candidates::found(search.listed, &problems, certificate)
-        .unwrap_or_else(|| candidates::none(nearest_whole::status(&open), &problems)))
+    Ok(
+        candidates::found(search.listed, &problems, certificate).unwrap_or_else(|| {
+            let mut none = candidates::none(nearest_whole::status(&open), &problems);
+            none.certificate.cells = search.cells;
+            none
+        }),
+    )
 }
 
 #[cfg(test)]
@@ -114,11 +126,23 @@ mod tests {
         let best_ln = problems[0].force_n().expect("a coil").ln();
         let coils = BoundedCoils::new(&problems[0], domain, best_ln).expect("an air coil");
         let coils = [coils];
-        let of = |budget| Strongest::of(&coils, best_ln - 0.01, budget, &Silent).expect("runs");
+        let of = |budget| {
+            let known = vec![next_to_continuous(&problems[0])];
+            Strongest::of(&coils, known, budget, &Silent).expect("runs")
+        };
         let none = of(0);
         assert_eq!(none.cells, 1);
         assert!(none.bound_ln > best_ln);
+        // The coil that was known before is one: that there was none was said without a budget.
+        assert!(
+            candidates::found(none.listed, &problems, |_| Certificate::of_searches(2, 1)).is_some()
+        );
         let some = of(64);
-        assert!(some.cells > 64 && some.bound_ln > best_ln && some.bound_ln < none.bound_ln);
+        let whole = next_to_continuous(&problems[0]);
+        let whole_ln = whole
+            .iter()
+            .map(|leaf| leaf.ln_force)
+            .fold(f64::NEG_INFINITY, f64::max);
+        assert!(some.cells > 64 && some.bound_ln >= whole_ln && some.bound_ln < none.bound_ln);
     }
 }
