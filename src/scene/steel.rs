@@ -150,10 +150,20 @@ impl Solved {
         })
     }
 
-    /// The same solution, whose places are no lower than `lowest_m`.
-    #[must_use]
-    pub(crate) fn with_lowest(self, lowest_m: f64) -> Self {
-        Self { lowest_m, ..self }
+    /// The same solution, with the error that it has at places no lower than `lowest_m`.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub(crate) fn with_lowest(self, lowest_m: f64) -> Result<Self, RunError> {
+        let steel_error = match self.steel().iron() {
+            Some(array) => array.error_from(lowest_m, STEEL_SHARE * self.tolerance)?,
+            None => self.steel_error,
+        };
+        Ok(Self {
+            lowest_m,
+            steel_error,
+            ..self
+        })
     }
 
     /// The steel as a source.
@@ -198,18 +208,20 @@ impl Solved {
         ))
     }
 
-    /// How far B is from that of a coarser solution at some of `points_m`, relative to |B| there; `None` where steel is
-    /// cores alone, whose error holds everywhere.
+    /// The error of B at some of `points_m`, relative to |B| there; `None` where steel is cores alone, whose error holds
+    /// everywhere.
     ///
     /// # Errors
     /// A place on a winding's edge.
-    pub fn iron_difference(&self, points_m: &[[f64; 3]]) -> Result<Option<f64>, RunError> {
+    pub fn iron_error(&self, points_m: &[[f64; 3]]) -> Result<Option<f64>, RunError> {
         let Some(array) = self.steel().iron() else {
             return Ok(None);
         };
         let some = spread(points_m.len(), IRON_SAMPLES).into_iter();
         let some: Vec<_> = some.map(|point| points_m[point]).collect();
-        Ok(array.difference_at(&some)?)
+        // Two solutions need not show by their difference what the solver and the evaluation leave.
+        let solver = array.solver_error(STEEL_SHARE * self.tolerance);
+        Ok(array.error_at(&some, solver + EVALUATION_SHARE * self.tolerance)?)
     }
 
     /// How [`Solved::steel_error`] is known; `None` without steel.

@@ -219,9 +219,10 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
         let to = "the moment times the largest |grad B| at the point's height";
         ("force", stage(estimate, to, &table.force_method))
     });
-    let iron = table.iron_difference.map(|estimate| {
+    let iron = table.iron_error.map(|estimate| {
         let to = "|B| of the nearest coil at the point";
-        let how = "difference from the next coarser panels at up to 24 of the points, also beside and below the array";
+        let how = "difference from the next coarser panels at up to 24 of the points, also beside and below the array, and what \
+                   the solver and the evaluation leave";
         ("iron_at_points", stage(estimate, to, how))
     });
     let linear = table.linear_cores.clone();

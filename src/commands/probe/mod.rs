@@ -41,8 +41,8 @@ pub struct ProbeTable {
     pub method: String,
     /// Whether it is relative to the largest at the height.
     pub relative_to_height: bool,
-    /// With steel of any shape the largest difference of B from a coarser solution at some of the points, relative to |B|.
-    pub iron_difference: Option<f64>,
+    /// With steel of any shape the estimated error of B at some of the points, relative to |B| there.
+    pub iron_error: Option<f64>,
     /// What linear cores leave of their B-H curve, where coupled ones have one.
     pub linear_cores: Option<StageAccuracy>,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
@@ -140,7 +140,7 @@ pub fn probe(
             evaluation = evaluation.max(proven);
         }
     }
-    let iron_difference = solved.iron_difference(&points_m)?;
+    let iron_error = solved.iron_error(&points_m)?;
     progress.end();
     let force_error = if request.force {
         let proven = (growth, evaluation);
@@ -158,7 +158,7 @@ pub fn probe(
         relative_error: solved.point_error(),
         method: solved.point_method(),
         relative_to_height: solved.has_steel(),
-        iron_difference,
+        iron_error,
         linear_cores: solved.linear_cores(),
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
@@ -189,7 +189,7 @@ fn finite(points_m: &[[f64; 3]]) -> Result<(), RunError> {
 /// As [`steel::solve`].
 fn solve_anywhere(scene: &Scene, heights_m: impl Iterator<Item = f64>) -> Result<Solved, RunError> {
     let solved = steel::solve(scene, scene.tolerances.field, f64::NEG_INFINITY)?;
-    Ok(solved.with_lowest(heights_m.fold(f64::INFINITY, f64::min)))
+    solved.with_lowest(heights_m.fold(f64::INFINITY, f64::min))
 }
 
 /// The error of the field.

@@ -298,8 +298,21 @@ impl IronArray {
         Ok(worst.max(apart_h / size) + self.solver_error(tolerance))
     }
 
+    /// The relative error of gradients at heights from `lowest_m` up, and of inductances, of what was solved to
+    /// `tolerance`: as [`IronArray::relative_error`] has it of those from the height that it was solved for.
+    ///
+    /// # Errors
+    /// A place on a winding's edge.
+    pub fn error_from(&self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+        self.coarser
+            .as_ref()
+            .map_or(Ok(self.relative_error), |coarser| {
+                self.difference(coarser, lowest_m, tolerance)
+            })
+    }
+
     /// What the linear solver leaves: two solved to this residual need not show it by their difference.
-    fn solver_error(&self, tolerance: f64) -> f64 {
+    pub fn solver_error(&self, tolerance: f64) -> f64 {
         self.relative_residual.max(SOLVER_SHARE * tolerance)
     }
 
@@ -344,12 +357,13 @@ impl IronArray {
         self.field_of(place_m, currents_a, &layers, &mut Halvings::new())
     }
 
-    /// The largest difference of B from what the next coarser resolution has at `places_m`, off the surface, relative to
-    /// |B| there, each of the coil that is nearest in plan; `None` where there is no coarser one.
+    /// The largest error of B at `places_m`, off the surface, relative to |B| there, each of the coil that is nearest in
+    /// plan: the difference from what the next coarser resolution has, and `alike`, a share of the steel's own field
+    /// that both lack alike; `None` where there is no coarser one.
     ///
     /// # Errors
     /// A place on a winding's edge.
-    pub fn difference_at(&self, places_m: &[Point]) -> Result<Option<f64>, OnEdge> {
+    pub fn error_at(&self, places_m: &[Point], alike: f64) -> Result<Option<f64>, OnEdge> {
         let Some(coarser) = &self.coarser else {
             return Ok(None);
         };
@@ -361,7 +375,8 @@ impl IronArray {
             currents_a[nearest.expect("an array has coils").0] = 1.0;
             let fine = self.field_t(*place, &currents_a)?;
             let coarse = coarser.field_t(*place, &currents_a)?;
-            Ok(apart(fine, coarse) / norm(fine))
+            let of_steel = apart(fine, self.of_windings_t(*place, &currents_a)?);
+            Ok((apart(fine, coarse) + alike * of_steel) / norm(fine))
         };
         let all = places_m.par_iter().map(of_place);
         let all = all.collect::<Result<Vec<f64>, OnEdge>>()?;
@@ -391,6 +406,12 @@ impl IronArray {
             let [bx, by, bz] = self.surface.field_near(own, values, halvings);
             sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
         }
+        let of_windings = self.of_windings_t(place_m, currents_a)?;
+        Ok([0, 1, 2].map(|k| sum[k] + of_windings[k]))
+    }
+
+    fn of_windings_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
+        let mut sum = [0.0; 3];
         for ([x, y], current) in self.positions_m.iter().zip(currents_a) {
             let (dx, dy) = (place_m[0] - x, place_m[1] - y);
             let field = self.winding.field(dx.hypot(dy), place_m[2])?;
