@@ -25,9 +25,15 @@ pub const MOST_DEFAULT_NODES: usize = 31;
 const CELLS: usize = 16;
 /// The lowest layers of cells, and the highest, are looked at: the error falls with the height.
 const LOWEST: usize = 3;
-/// How far into its cell, along every axis, a place lies: on a node, where the gradient is off
-/// most; where the cubic's error is largest; in the middle.
-const PARTS_OF_CELL: [f64; 3] = [0.0, 0.25, 0.5];
+/// How far into its cell, along x, y and z, a place lies: on a node, where the gradient is off most; where the cubic's
+/// error is largest; in the middle; there on the layer of nodes, where along z no error makes up for those across.
+const PARTS_OF_CELL: [[f64; 3]; 5] = [
+    [0.0; 3],
+    [0.25; 3],
+    [0.5; 3],
+    [0.5, 0.5, 0.0],
+    [0.75, 0.5, 0.0],
+];
 
 /// The nodes: they span the workspace and one step more on every side, so that no place in it
 /// meets the one-sided slopes at the nodes' ends. Downwards they stay clear of `top_m`.
@@ -98,8 +104,8 @@ pub(super) fn make(
     let errors = interpolation_errors(&field_t_per_a, count, steps_m, &places, &samples, &heights);
     let method = format!(
         "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
-         central slopes) from direct values at {} places on nodes, in the middles of cells and \
-         half way between, in the lowest layers and the highest, of every coil; and the nodes' own \
+         central slopes) from direct values at {} places on nodes, in the middles of cells and of \
+         their faces and between, in the lowest layers and the highest, of every coil; and the nodes' own \
          error",
         samples.points_m.len()
     );
@@ -180,10 +186,13 @@ fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[AxisPosition; 3]> {
         if k >= LOWEST && k < highest {
             continue;
         }
-        for part in PARTS_OF_CELL {
-            let place = |cell: &usize| AxisPosition { cell: *cell, part };
+        for parts in PARTS_OF_CELL {
+            let place = |axis: usize, cell: &usize| AxisPosition {
+                cell: *cell,
+                part: parts[axis],
+            };
             for y in &y {
-                out.extend(x.iter().map(|x| [place(x), place(y), place(z)]));
+                out.extend(x.iter().map(|x| [place(0, x), place(1, y), place(2, z)]));
             }
         }
     }
