@@ -91,6 +91,7 @@ fn the_whole_coil_that_misses_least_has_its_own_bore() {
         .run(&[&args[..], &["--wound"]].concat())
         .ends(4)
         .json();
+    assert!(number(&none, "certificate/cells") > 0.0, "{none}");
     let none = &none["no_coil"];
     // One turn more than fits, 14 layers at the widest bore: its heat is allowed.
     let missed = none["violations"].as_array().unwrap();
@@ -115,6 +116,21 @@ fn the_whole_coil_that_misses_least_has_its_own_bore() {
         message.contains("51.000 mm where 50.600 mm are allowed, 0.8 % off"),
         "{message}"
     );
+}
+
+/// Where the supply's voltage sets the current no coil settles in time, and without that limit each one was looked at:
+/// an hour's work for what less than two thousand boxes prove.
+#[test]
+fn a_regime_without_a_coil_does_not_hold_up_the_proof_of_another() {
+    let place = Place::new();
+    let text = "name = \"small\"\n[wire]\ndiameter_mm = 0.1\n[supply]\ncurrent_max_a = 0.2\nvoltage_v = 4.7\n\
+                [target]\nheight_mm = 50\n[limits]\nouter_diameter_max_mm = 36\nlength_max_mm = 30\n\
+                settling_max_ms = 0.036\n";
+    place.write("small.toml", text);
+    let args = ["optimize", "small.toml", "--wound", "--format", "json"];
+    let budget = ["--certificate-cells", "20000"];
+    let small = place.run(&[&args[..], &budget].concat()).ends(0).json();
+    assert_eq!(small["certificate"]["kind"], "global", "{small}");
 }
 
 /// An array of coils of whole layers for a flat shape.

@@ -67,7 +67,7 @@ impl LatticeBox {
 pub(super) struct BoundedCoils<'a> {
     bores: Bores<'a>,
     bounding: Bounding<'a>,
-    /// Whether the settling time holds the continuous optimum back.
+    /// Whether the settling time holds the continuous optimum back, or may be why there is none.
     with_settling: bool,
     best_ln: f64,
 }
@@ -82,7 +82,7 @@ impl<'a> BoundedCoils<'a> {
             .map_or_else(Multipliers::default, |local| {
                 Multipliers::of(problem, &local.multipliers)
             });
-        let with_settling = multipliers.settling > 0.0;
+        let with_settling = multipliers.settling > 0.0 || solved.best.is_none();
         Some(Self {
             bounding: Bounding::new(problem, domain, multipliers, with_settling)?,
             bores: Bores::of(problem),

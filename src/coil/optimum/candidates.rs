@@ -25,10 +25,12 @@ pub(super) struct Leaf {
     pub ln_force: f64,
 }
 
-/// No coil that can be wound, beside what `problems` found of those that cannot.
-pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
+/// No coil that can be wound among `cells` sets of them, beside what `problems` found of those that cannot.
+pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>], cells: usize) -> Outcome {
     let best = local_searches::best_of(problems);
+    let starts = local_searches::starts_of(problems);
     Outcome {
+        certificate: Certificate::of_searches(starts, cells),
         continuous_force_n: best.and_then(Solved::force_n),
         continuous: best.and_then(search::describe),
         wires: Vec::new(),
@@ -44,7 +46,7 @@ pub(super) fn found(
     certificate: impl FnOnce(&BestCoil) -> Certificate,
 ) -> Option<Outcome> {
     let (mut best, others) = (listed.best?, listed.others);
-    let outcome = none(OptimumStatus::Optimal, problems);
+    let outcome = none(OptimumStatus::Optimal, problems, 0);
     for used in &mut best.limits {
         let continuous = outcome.continuous.as_ref();
         used.sensitivity_n_per_unit = continuous

@@ -92,7 +92,7 @@ pub(super) fn optimise(
     Ok(
         candidates::found(search.listed, sharp, certificate).unwrap_or_else(|| {
             let open: Vec<&Solved<'_>> = open().collect();
-            candidates::none(nearest_whole::status(&open), sharp)
+            candidates::none(nearest_whole::status(&open), sharp, search.cells)
         }),
     )
 }

@@ -31,12 +31,16 @@ pub fn optimise_wound(
     let task = &match of_whole_wires(task) {
         Ok(task) => task,
         Err(refused) => {
-            return Ok(candidates::none(OptimumStatus::Contradictory(refused), &[]));
+            return Ok(candidates::none(
+                OptimumStatus::Contradictory(refused),
+                &[],
+                0,
+            ));
         }
     };
     let problems = match search::solve_all(model, task, settings, progress)? {
         Ok(problems) => problems,
-        Err((status, problems)) => return Ok(candidates::none(status, &problems)),
+        Err((status, problems)) => return Ok(candidates::none(status, &problems, 0)),
     };
     if model.air_dipoles().is_none() {
         return screened_coils::optimise(model, task, &problems, progress);
@@ -88,13 +92,8 @@ pub fn optimise_wound(
             cells: search.cells,
         }
     };
-    Ok(
-        candidates::found(search.listed, &problems, certificate).unwrap_or_else(|| {
-            let mut none = candidates::none(nearest_whole::status(&open), &problems);
-            none.certificate.cells = search.cells;
-            none
-        }),
-    )
+    Ok(candidates::found(search.listed, &problems, certificate)
+        .unwrap_or_else(|| candidates::none(nearest_whole::status(&open), &problems, search.cells)))
 }
 
 #[cfg(test)]

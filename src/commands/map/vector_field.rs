@@ -93,15 +93,9 @@ pub(super) fn make(
     let field_t_per_a = made.map.field_t_per_a.unwrap_or_default();
     let workspace = &scene.design.workspace;
     let within = [workspace.x_m, workspace.y_m, workspace.z_m];
-    let places = places(axes, within);
-    let steps_m = axes.map(|axis| axis.step());
-    let at = |place: &[AxisPosition; 3]| -> [f64; 3] {
-        std::array::from_fn(|k| axes[k].node(place[k].cell) + place[k].part * steps_m[k])
-    };
-    let points_m = places.iter().map(at).collect();
-    let samples = direct(scene, solved, points_m, progress)?;
-    let heights = largest(&samples);
-    let errors = interpolation_errors(&field_t_per_a, count, steps_m, &places, &samples, &heights);
+    let places = places(axes, within, &PARTS_OF_CELL);
+    let samples = direct(scene, solved, points_m(axes, &places), progress)?;
+    let errors = interpolation_errors(&field_t_per_a, axes, &places, &samples);
     let method = format!(
         "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
          central slopes) from direct values at {} places on nodes, in the middles of cells and of \
@@ -115,7 +109,7 @@ pub(super) fn make(
         summary: VectorFieldSummary {
             file: path.display().to_string(),
             nodes: count,
-            step_m: steps_m,
+            step_m: axes.map(|axis| axis.step()),
             checks: samples.points_m.len(),
             field_error,
             gradient_error,
@@ -131,18 +125,18 @@ pub(super) fn make(
 /// to the largest at the height.
 fn interpolation_errors(
     field_t_per_a: &[f64],
-    count: usize,
-    steps_m: [f64; 3],
+    axes: [Axis; 3],
     places: &[[AxisPosition; 3]],
     samples: &Samples,
-    heights: &[(f64, [f64; 2])],
 ) -> [f64; 2] {
+    let heights = largest(samples);
+    let count = axes[0].samples;
     let mut errors = [0.0_f64; 2];
     let whole = 3 * count * count * count;
     for (values, parts) in field_t_per_a.chunks_exact(whole).zip(&samples.parts) {
         let nodes = Nodes {
             count,
-            steps_m,
+            steps_m: axes.map(|axis| axis.step()),
             values,
         };
         for ((place, at), direct) in places.iter().zip(&samples.points_m).zip(parts) {
@@ -176,7 +170,19 @@ fn spread(axis: Axis, within: Axis, most: usize) -> Vec<usize> {
         .collect()
 }
 
-fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[AxisPosition; 3]> {
+fn points_m(axes: [Axis; 3], places: &[[AxisPosition; 3]]) -> Vec<[f64; 3]> {
+    let at = |place: &[AxisPosition; 3]| {
+        std::array::from_fn(|k| axes[k].node(place[k].cell) + place[k].part * axes[k].step())
+    };
+    places.iter().map(at).collect()
+}
+
+/// The places in the cells that are looked at, as far into each of them as `parts_of_cell` has it.
+fn places(
+    axes: [Axis; 3],
+    within: [Axis; 3],
+    parts_of_cell: &[[f64; 3]],
+) -> Vec<[AxisPosition; 3]> {
     let x = spread(axes[0], within[0], CELLS);
     let y = spread(axes[1], within[1], CELLS);
     let layers = spread(axes[2], within[2], axes[2].samples);
@@ -186,7 +192,7 @@ fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[AxisPosition; 3]> {
         if k >= LOWEST && k < highest {
             continue;
         }
-        for parts in PARTS_OF_CELL {
+        for parts in parts_of_cell {
             let place = |axis: usize, cell: &usize| AxisPosition {
                 cell: *cell,
                 part: parts[axis],
@@ -202,6 +208,43 @@ fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[AxisPosition; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::{Design, Need};
+    use crate::progress::Silent;
+    use crate::scene::steel;
+    use std::path::Path;
+
+    /// Places equally far into their cells along all axes missed the worst, in the middle across and on a layer of nodes.
+    #[test]
+    fn the_error_of_few_nodes_covers_every_place_in_a_cell() {
+        let text = "name = \"one\"\n[coil]\ninner_diameter_mm = 20\nouter_diameter_mm = 32\nlength_mm = 50\n\
+                    [wire]\ndiameter_mm = 0.5\n[workspace]\nx_mm = [-40, 45, 11]\ny_mm = [-35, 40, 11]\n\
+                    z_mm = [12, 60, 11]\n";
+        let (design, _) =
+            Design::from_toml(text, Path::new("one.toml"), Need::EVALUATE).expect("reads");
+        let scene = Scene::new(&design).expect("a scene");
+        let solved = steel::solve(&scene, scene.tolerances.field, 0.0).expect("air");
+        let within = [
+            design.workspace.x_m,
+            design.workspace.y_m,
+            design.workspace.z_m,
+        ];
+        let eighth = |k: usize| 0.125 * (k % 8) as f64;
+        let dense: Vec<[f64; 3]> = (0..512)
+            .map(|k| [eighth(k), eighth(k / 8), eighth(k / 64)])
+            .collect();
+        for count in [6, 7, 8] {
+            let axes = nodes(&scene, Some(count)).expect("a box");
+            let made = make(&scene, &solved, "v.yaml".into(), axes, &Silent).expect("a map");
+            let all = places(axes, within, &dense);
+            let samples =
+                direct(&scene, &solved, points_m(axes, &all), &Silent).expect("off the windings");
+            let worst = interpolation_errors(&made.field_t_per_a, axes, &all, &samples);
+            let stated = [made.summary.field_error, made.summary.gradient_error];
+            for k in 0..2 {
+                assert!(worst[k] <= stated[k], "{count}: {worst:?} {stated:?}");
+            }
+        }
+    }
 
     #[test]
     fn cells_in_the_workspace_are_looked_at() {
