@@ -1,5 +1,6 @@
 //! The magnet as a point dipole (eq. 1, 2, 5).
 
+use fluxform_numerics::dispatch::Lanes;
 use std::f64::consts::PI;
 
 /// Moment of a uniformly magnetised cylinder, A m^2.
@@ -17,6 +18,20 @@ pub fn force_n(moment_a_m2: [f64; 3], gradient_t_per_m: [[f64; 3]; 3]) -> [f64; 
             .map(|i| moment_a_m2[i] * gradient_t_per_m[i][j])
             .sum()
     })
+}
+
+/// `scale` times n.(x - y) / |x - y|^3 of a dipole n at y, at places x.
+#[inline(always)]
+pub(crate) fn potential<const FMA: bool>(
+    x: [Lanes; 3],
+    y: [f64; 3],
+    n: [f64; 3],
+    scale: f64,
+) -> Lanes {
+    let d = [x[0] - y[0], x[1] - y[1], x[2] - y[2]];
+    let square = d[0].mul_add::<FMA>(d[0], d[1].mul_add::<FMA>(d[1], d[2] * d[2]));
+    let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+    along * scale / (square * square.sqrt())
 }
 
 /// The moment vector of a magnet whose axis is tilted about x, then about y; `along_z_a_m2`

@@ -647,6 +647,7 @@ impl<'a> Level<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::face::Resolution;
+    use super::super::panel_columns::Targets;
     use super::super::plate::Outline;
     use super::super::surface::Surface;
     use super::*;
@@ -758,8 +759,12 @@ mod tests {
                 if beside {
                     continue;
                 }
+                let mut target = Targets::default();
+                target.push(at, None);
                 let mut row = vec![0.0; surface.size()];
-                surface.add_row(at, &mut row);
+                for panel in 0..surface.panels().len() {
+                    surface.panel_columns(panel, &target, &mut row[surface.nodes_of(panel)]);
+                }
                 let jump = |node: usize| {
                     let [own, other] = surface.face_of(node).chi;
                     own - other

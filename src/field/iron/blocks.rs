@@ -50,10 +50,9 @@ impl Block {
             }
             let along = rest(whole.row(pivot).transpose(), &right, &left, pivot);
             let scaled = along / across[pivot];
-            let next = (across.iter().enumerate())
-                .filter(|(at, _)| *at != pivot)
-                .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-            row = next.map_or(0, |(at, _)| at);
+            let mut others = across.clone();
+            others[pivot] = 0.0;
+            row = others.icamax();
             left.push(across);
             right.push(scaled);
         }
@@ -156,7 +155,8 @@ fn halve(
     out: &mut Vec<Vec<usize>>,
 ) {
     if items.len() < 2 || size(&items) <= CLUSTER {
-        out.push(items);
+        // Of no items there is no cluster.
+        out.extend(Some(items).filter(|items| !items.is_empty()));
         return;
     }
     let extent = |axis: &usize| {

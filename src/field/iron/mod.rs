@@ -21,6 +21,7 @@ pub mod face;
 mod inductance;
 pub mod mesh_body;
 mod near_windings;
+mod panel_columns;
 mod parts;
 pub mod passive;
 pub mod plate;

@@ -70,38 +70,59 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Visits parts small enough for their rules to integrate the kernel at `target_m`.
-    pub(super) fn visit(&mut self, target_m: Point, place: Place, visit: &mut impl FnMut(&Rule)) {
-        let most = match place {
-            Place::OnPanel => MOST_ON_PANEL,
-            Place::OffPanel => MOST_OFF_PANEL,
-        };
-        self.visit_part(target_m, 0, most, visit);
+    /// Visits parts small enough for their rules to integrate the kernel at a place off the panel.
+    pub(super) fn visit(&mut self, target_m: Point, visit: &mut impl FnMut(&Rule)) {
+        let target = |_| (target_m, Place::OffPanel);
+        self.visit_part(&target, &mut [0], [0; 2], &mut |rule, _| visit(rule));
     }
 
+    /// The same at `some` of many targets, each part with those for which it is small enough.
+    pub(super) fn visit_all(
+        &mut self,
+        target: &impl Fn(usize) -> (Point, Place),
+        some: &mut [usize],
+        visit: &mut impl FnMut(&Rule, &[usize]),
+    ) {
+        self.visit_part(target, some, [0; 2], visit);
+    }
+
+    /// The part of a number and a depth, or its parts.
     fn visit_part(
         &mut self,
-        target_m: Point,
-        number: usize,
-        halvings_left: usize,
-        visit: &mut impl FnMut(&Rule),
+        target: &impl Fn(usize) -> (Point, Place),
+        some: &mut [usize],
+        [number, depth]: [usize; 2],
+        visit: &mut impl FnMut(&Rule, &[usize]),
     ) {
         let part = &self.parts[number].panel;
-        let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
         let half = 0.5 * part.sides_m[0].max(part.sides_m[1]);
-        let halved = halvings_left > 0 && half > coordinate_rounding_m(target_m);
-        if distance < NEAR * half && halved {
-            let first = self.halves(number);
-            for half in [first, first + 1] {
-                self.visit_part(target_m, half, halvings_left - 1, visit);
+        let mut halved = 0;
+        for k in 0..some.len() {
+            let (target_m, place) = target(some[k]);
+            let most = match place {
+                Place::OnPanel => MOST_ON_PANEL,
+                Place::OffPanel => MOST_OFF_PANEL,
+            };
+            let distance = norm(minus(target_m, part.centre_m)) - part.radius_m;
+            if distance < NEAR * half && depth < most && half > coordinate_rounding_m(target_m) {
+                some.swap(k, halved);
+                halved += 1;
             }
-        } else {
+        }
+        let (halved, enough) = some.split_at_mut(halved);
+        if !enough.is_empty() {
             let (whole, part) = (self.parts[0].panel, &mut self.parts[number]);
             let rule = (part.rule).get_or_insert_with(|| {
                 let order = whole.order + MORE_NODES;
                 Rule::new(self.face, self.basis, &whole, &part.panel, order)
             });
-            visit(rule);
+            visit(rule, enough);
+        }
+        if !halved.is_empty() {
+            let first = self.halves(number);
+            for half in [first, first + 1] {
+                self.visit_part(target, halved, [half, depth + 1], visit);
+            }
         }
     }
 

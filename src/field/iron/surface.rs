@@ -15,12 +15,21 @@ use fluxform_numerics::vec3::{dot, minus, norm};
 
 /// Distance in half sides from which on a panel's own nodes integrate the kernel.
 pub(super) const FAR: f64 = 3.0;
-/// Most nodes along a panel's side.
-const MOST_ORDER: usize = 16;
 /// Length of the panels of dipoles relative to their distance.
 const DIPOLE_PANEL: f64 = 1.5;
 /// Most nodes along a side of them.
 const MOST_DIPOLES: usize = 24;
+
+/// How a place lies to a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Distance {
+    /// In its plane, where its layers give nothing.
+    InPlane,
+    /// So close that it is taken in parts.
+    Near,
+    /// So far that its own nodes integrate the kernel.
+    Far,
+}
 
 /// Faces cut into panels, with nodes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -98,43 +107,24 @@ impl Surface {
         [place, [u1 - u0, v1 - v0].map(|side| side / order as f64)]
     }
 
-    /// Adds to `row` what the layer of every node gives at `target_m`:
-    /// int n'.(x - y) / (4 pi |x - y|^3) v(y) dS, off the surface.
-    pub fn add_row(&self, target_m: Point, row: &mut [f64]) {
-        for panel in 0..self.panels.len() {
-            let (row, parts) = (&mut row[self.nodes_of(panel)], &mut self.parts_of(panel));
-            self.add_panel(target_m, Place::OffPanel, panel, row, parts);
-        }
-    }
-
-    /// The same of the nodes of one panel, which is given with its parts, also at nodes: as a principal value, to which
-    /// the place of a node itself gives nothing.
-    pub(super) fn add_panel(
-        &self,
-        target_m: Point,
-        place: Place,
-        panel: usize,
-        row: &mut [f64],
-        parts: &mut Parts<'_>,
-    ) {
-        let nodes = self.nodes_of(panel);
+    /// How a place lies to a panel.
+    pub(super) fn distance_class(&self, panel: usize, target_m: Point) -> Distance {
         let panel = &self.panels[panel];
         let away = minus(target_m, panel.centre_m);
         let distance = norm(away);
         // What lies in the panel's plane; of a small body far from the origin as its coordinates round.
-        if let Some(normal) = panel.plane
-            && dot(normal, away).abs()
+        let is_in = |normal: Point| {
+            dot(normal, away).abs()
                 < 1e-12 * (distance + panel.radius_m) + coordinate_rounding_m(target_m)
-        {
-            return;
+        };
+        if panel.plane.is_some_and(is_in) {
+            return Distance::InPlane;
         }
         let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
         if distance - panel.radius_m > FAR * half {
-            for (value, node) in row.iter_mut().zip(&self.nodes[nodes]) {
-                *value += kernel(target_m, node);
-            }
+            Distance::Far
         } else {
-            add_near(target_m, place, panel.order, row, parts);
+            Distance::Near
         }
     }
 
@@ -223,7 +213,7 @@ impl Surface {
             let parts = halvings
                 .entry(number)
                 .or_insert_with(|| self.parts_of(number));
-            parts.visit(target_m, Place::OffPanel, &mut |rule| {
+            parts.visit(target_m, &mut |rule| {
                 for (k, node) in rule.nodes.iter().enumerate() {
                     let first = &rule.bases[0][k / rule.order * count..][..count];
                     let second = &rule.bases[1][k % rule.order * count..][..count];
@@ -390,39 +380,6 @@ pub(super) fn mirrored(node: &Node, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> N
         place_m: [cx + sx * (x - cx), cy + sy * (y - cy), z],
         area_m2: [sx * ax, sy * ay, az],
     }
-}
-
-/// Adds to `row` what the nodes of a panel give at `target_m` close to it, `count` along each side.
-fn add_near(target_m: Point, place: Place, count: usize, row: &mut [f64], parts: &mut Parts<'_>) {
-    parts.visit(target_m, place, &mut |rule| {
-        let [first, second] = &rule.bases;
-        let mut line = [0.0; MOST_ORDER];
-        let lines = rule.nodes.chunks_exact(rule.order);
-        for (nodes, first) in lines.zip(first.chunks_exact(count)) {
-            line[..count].fill(0.0);
-            for (node, second) in nodes.iter().zip(second.chunks_exact(count)) {
-                let value = kernel(target_m, node);
-                for (sum, weight) in line.iter_mut().zip(second) {
-                    *sum += value * weight;
-                }
-            }
-            for (weight, row) in first.iter().zip(row.chunks_exact_mut(count)) {
-                for (value, sum) in row.iter_mut().zip(&line) {
-                    *value += weight * sum;
-                }
-            }
-        }
-    });
-}
-
-#[inline]
-fn kernel(target_m: Point, node: &Node) -> f64 {
-    let d = minus(target_m, node.place_m);
-    let square = dot(d, d);
-    if square == 0.0 {
-        return 0.0;
-    }
-    dot(node.area_m2, d) / (4.0 * PI * square * square.sqrt())
 }
 
 /// Adds B of a layer's element, that of the moment -v n dS.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::blocks::{BlockRow, Blocks, Clusters, FAR};
 use super::bodies::Iron;
 use super::face::Node;
-use super::parts::Place;
+use super::panel_columns::Targets;
 use super::surface::{Surface, mirrored};
 use fluxform_numerics::gmres::gmres;
 use fluxform_numerics::lu::Factored;
@@ -251,6 +251,21 @@ impl Parities {
     }
 }
 
+/// Turns what every image gives, `count` values each, into what every parity does: the sum over the images, each with
+/// its [`sign`].
+fn of_parities(values: &mut [f64], count: usize) {
+    let mut half = count;
+    while half < values.len() {
+        for pair in values.chunks_exact_mut(2 * half) {
+            let (one, other) = pair.split_at_mut(half);
+            for (one, other) in one.iter_mut().zip(other) {
+                (*one, *other) = (*one + *other, *one - *other);
+            }
+        }
+        half *= 2;
+    }
+}
+
 /// Of every parity and body whose constant it allows: nodes with their share of its area.
 fn constants(iron: &Iron, surface: &Surface, images: &[[f64; 2]]) -> Vec<Vec<Vec<(usize, f64)>>> {
     let allows = |parity: usize, body: usize| {
@@ -293,22 +308,33 @@ impl Assembly<'_> {
     /// gives.
     fn rows(&self, own: usize) -> Result<(Vec<BlockRow>, Vec<f64>), TooMany> {
         let clusters = self.clusters.items.len();
+        let nodes = self.clusters.places(own);
+        let mut targets = Targets::default();
+        for (image, signs) in self.images.iter().enumerate() {
+            for node in nodes {
+                let place = &self.surface.nodes[*node];
+                let place_m = mirrored(place, *signs, self.iron.planes_m).place_m;
+                targets.push(place_m, (image == 0).then_some(*node));
+            }
+        }
+        let body = |node: usize| self.surface.face_of(node).body;
+        let bodies: Vec<usize> = nodes.iter().map(|node| body(*node)).collect();
         let parities = 0..self.images.len();
         let mut rows: Vec<BlockRow> = parities
             .map(|_| BlockRow::with_capacity(clusters))
             .collect();
-        let body = |node: usize| self.surface.face_of(node).body;
-        let nodes = self.clusters.places(own);
         let mut whole = vec![0.0; nodes.len()];
         for other in 0..clusters {
             fluxform_base::progress::poll();
-            let parts = self.images_of(own, other);
-            for (signs, part) in self.images.iter().zip(&parts) {
-                for (k, column) in self.clusters.places(other).iter().enumerate() {
-                    for (at, node) in nodes.iter().enumerate() {
-                        // Images that leave the body where it is.
-                        if body(*column) == body(*node) && self.iron.keeps(body(*node), *signs) {
-                            whole[at] += part[(at, k)];
+            let mut columns = self.columns(&targets, other);
+            let places = self.clusters.places(other);
+            for (column, node) in columns.chunks_exact(targets.count()).zip(places) {
+                let of = body(*node);
+                for (signs, part) in self.images.iter().zip(column.chunks_exact(nodes.len())) {
+                    // Images that leave the body where it is.
+                    if self.iron.keeps(of, *signs) {
+                        for ((sum, body), value) in whole.iter_mut().zip(&bodies).zip(part) {
+                            *sum += if *body == of { *value } else { 0.0 };
                         }
                     }
                 }
@@ -318,11 +344,16 @@ impl Assembly<'_> {
             } else {
                 0.0
             };
+            for column in columns.chunks_exact_mut(targets.count()) {
+                of_parities(column, nodes.len());
+            }
             for (parity, row) in rows.iter_mut().enumerate() {
-                let mut sum = parts[0].clone();
-                for (image, part) in parts.iter().enumerate().skip(1) {
-                    sum += part * sign(parity, image);
+                let mut sum = Vec::with_capacity(nodes.len() * places.len());
+                let parts = columns.chunks_exact(nodes.len());
+                for part in parts.skip(parity).step_by(self.images.len()) {
+                    sum.extend_from_slice(part);
                 }
+                let sum = DMatrix::from_vec(nodes.len(), places.len(), sum);
                 let entries = row.push(sum, threshold);
                 if self.taken.fetch_add(entries, Relaxed) + entries > self.most_entries {
                     return Err(TooMany);
@@ -332,34 +363,21 @@ impl Assembly<'_> {
         Ok((rows, whole))
     }
 
-    /// What the nodes of cluster `other` give at every image of those of `own`.
-    fn images_of(&self, own: usize, other: usize) -> Vec<DMatrix<f64>> {
-        let (targets, nodes) = (self.clusters.places(own), self.clusters.places(other));
-        let mut parts = vec![DMatrix::zeros(targets.len(), nodes.len()); self.images.len()];
-        let mut first = 0;
-        for panel in &self.clusters.items[other] {
-            let of_panel = self.surface.nodes_of(*panel);
-            let strengths = &self.strengths[of_panel.clone()];
-            let mut row = vec![0.0; of_panel.len()];
-            let mut halvings = self.surface.parts_of(*panel);
-            for (image, (signs, part)) in self.images.iter().zip(&mut parts).enumerate() {
-                for (at, node) in targets.iter().enumerate() {
-                    let place = match image {
-                        0 => self.surface.place_of(*node, *panel),
-                        _ => Place::OffPanel,
-                    };
-                    let target = &self.surface.nodes[*node];
-                    let target_m = mirrored(target, *signs, self.iron.planes_m).place_m;
-                    row.fill(0.0);
-                    (self.surface).add_panel(target_m, place, *panel, &mut row, &mut halvings);
-                    for (k, (value, strength)) in row.iter().zip(strengths).enumerate() {
-                        part[(at, first + k)] = value * strength;
-                    }
-                }
+    /// What the nodes of a cluster give at `targets`, [node][target].
+    fn columns(&self, targets: &Targets, cluster: usize) -> Vec<f64> {
+        let count = targets.count();
+        let mut columns = vec![0.0; self.clusters.places(cluster).len() * count];
+        let mut rest = columns.as_mut_slice();
+        for panel in &self.clusters.items[cluster] {
+            let nodes = self.surface.nodes_of(*panel);
+            let own;
+            (own, rest) = rest.split_at_mut(nodes.len() * count);
+            self.surface.panel_columns(*panel, targets, own);
+            for (column, strength) in own.chunks_exact_mut(count).zip(&self.strengths[nodes]) {
+                column.iter_mut().for_each(|value| *value *= strength);
             }
-            first += of_panel.len();
         }
-        parts
+        columns
     }
 
     /// Whether every image of cluster `own` is far from `other`.

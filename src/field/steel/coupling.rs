@@ -9,6 +9,7 @@ use super::exchange::LEAST_GAP;
 use super::offsets::Offsets;
 use super::response::{Response, Ring};
 use super::symmetry::Motion;
+use crate::dipole::potential;
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
@@ -311,12 +312,8 @@ impl Kernel for Dipoles<'_> {
         for (column, (y, n)) in self.matrix.chunks_exact_mut(rows).zip(self.senders) {
             fluxform_base::progress::poll();
             for (group, out) in column.chunks_mut(LANES).enumerate() {
-                let axis =
-                    |axis: usize| Lanes::load(&self.receivers_m[axis][group * LANES..]) - y[axis];
-                let d = [axis(0), axis(1), axis(2)];
-                let square = d[0].mul_add::<FMA>(d[0], d[1].mul_add::<FMA>(d[1], d[2] * d[2]));
-                let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
-                (along * self.scale / (square * square.sqrt())).store(out);
+                let axis = |axis: usize| Lanes::load(&self.receivers_m[axis][group * LANES..]);
+                potential::<FMA>([axis(0), axis(1), axis(2)], *y, *n, self.scale).store(out);
             }
         }
     }
