@@ -7,16 +7,18 @@
 
 /* ---- the surface's height --------------------------------------------------------------------- */
 
+/* Share of a cell's width from a node within which a position is at the node: computed otherwise the
+ * same coordinate has other last bits. */
+#define AT_NODE 1e-9
+
 /* The cell that holds a position, and the position's share of its width. */
 static int find_between(const double *nodes, size_t n, double position, size_t *at, double *share)
 {
     size_t low = 0, high = n;
-    if (!(nodes[0] <= position && position <= nodes[n - 1]))
-        return 0;
     *at = 0;
     *share = 0;
     if (n == 1)
-        return 1;
+        return position == nodes[0];
     while (low < high) {
         size_t middle = low + (high - low) / 2;
         if (nodes[middle] <= position)
@@ -24,9 +26,15 @@ static int find_between(const double *nodes, size_t n, double position, size_t *
         else
             high = middle;
     }
-    *at = low - 1 < n - 2 ? low - 1 : n - 2;
+    *at = low < 1 ? 0 : low - 1 < n - 2 ? low - 1 : n - 2;
     *share = (position - nodes[*at]) / (nodes[*at + 1] - nodes[*at]);
-    return 1;
+    for (int node = 0; node < 2; node++)
+        if (fabs(*share - node) <= AT_NODE) {
+            *at += node;
+            *share = 0;
+            return 1;
+        }
+    return *share > 0 && *share < 1;
 }
 
 /* A value between four nodes, `stride` numbers apart. */

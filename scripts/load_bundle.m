@@ -179,12 +179,20 @@ function [cell, share] = between(nodes, position)
 % The cell that holds a position and the position's share of its width; none outside.
     cell = [];
     share = 0;
-    if ~(nodes(1) <= position && position <= nodes(end))
+    if numel(nodes) == 1
+        cell = find(nodes == position);
         return
     end
-    cell = max(min(sum(nodes <= position), numel(nodes) - 1), 1);
-    if numel(nodes) > 1
-        share = (position - nodes(cell)) / (nodes(cell + 1) - nodes(cell));
+    below = max(min(sum(nodes <= position), numel(nodes) - 1), 1);
+    part = (position - nodes(below)) / (nodes(below + 1) - nodes(below));
+    % Computed otherwise the same coordinate has other last bits: a billionth from a node is at it.
+    if abs(part) <= 1e-9
+        cell = below;
+    elseif abs(part - 1) <= 1e-9
+        cell = below + 1;
+    elseif part > 0 && part < 1
+        cell = below;
+        share = part;
     end
 end
 

@@ -281,19 +281,26 @@ impl SurfaceCell {
     }
 }
 
-/// The cell that holds a position, and the position's share of its width; `None` outside.
+/// Share of a cell's width from a node within which a position is at the node: computed otherwise the same
+/// coordinate has other last bits.
+const AT_NODE: f64 = 1e-9;
+
+/// The cell that holds a position, and the position's share of its width, 0 at a node; `None` outside.
 fn between(nodes: &[f64], position: f64) -> Option<(usize, f64)> {
-    let (&first, &last) = (nodes.first()?, nodes.last()?);
-    if !(first <= position && position <= last) {
-        return None;
-    }
-    if nodes.len() == 1 {
-        return Some((0, 0.0));
+    let last = nodes.len().checked_sub(1)?;
+    if last == 0 {
+        return (position == nodes[0]).then_some((0, 0.0));
     }
     let above = nodes.partition_point(|&node| node <= position);
-    let cell = above.saturating_sub(1).min(nodes.len() - 2);
+    let cell = above.saturating_sub(1).min(last - 1);
     let (from, to) = (nodes[cell], nodes[cell + 1]);
-    Some((cell, (position - from) / (to - from)))
+    let share = (position - from) / (to - from);
+    for node in [0, 1] {
+        if (share - node as f64).abs() <= AT_NODE {
+            return Some((cell + node, 0.0));
+        }
+    }
+    (share > 0.0 && share < 1.0).then_some((cell, share))
 }
 
 #[cfg(test)]
@@ -349,6 +356,13 @@ mod tests {
         assert!(grid.height_m(0.0, 0.1).is_some(), "the lower side");
         assert!(grid.height_m(0.02, 0.14).is_some(), "a corner with surface");
         assert!(grid.height_m(0.03, 0.2).is_some(), "another cell");
+        // Rounding asks no node of no weight, and leaves none behind.
+        for off in [-1e-16, 0.0, 1e-16] {
+            assert!(grid.height_m(0.02 + off, 0.14 + off).is_some(), "{off}");
+            assert!(grid.height_m(-0.03 + off, 0.1 - off).is_some(), "{off}");
+            assert!(grid.height_m(0.07 - off, 0.21 + off).is_some(), "{off}");
+            assert_eq!(grid.height_m(0.01 + off, 0.14 - off), None, "{off}");
+        }
     }
 
     #[test]

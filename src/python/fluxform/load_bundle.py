@@ -505,14 +505,20 @@ def _stencil(nodes, positions):
     return index, weights
 
 
+# Share of a cell's width from a node within which a position is at the node: computed otherwise the same
+# coordinate has other last bits.
+AT_NODE = 1e-9
+
+
 def _between(nodes, positions):
     """Cells that hold positions, the positions' shares of their widths, and whether there is one."""
-    inside = (nodes[0] <= positions) & (positions <= nodes[-1])
-    positions = np.where(inside, positions, nodes[0])
-    cell = np.clip(np.searchsorted(nodes, positions, side="right") - 1, 0, max(len(nodes) - 2, 0))
     if len(nodes) == 1:
-        return cell, np.zeros(len(positions)), inside
-    return cell, (positions - nodes[cell]) / (nodes[cell + 1] - nodes[cell]), inside
+        return np.zeros(len(positions), int), np.zeros(len(positions)), positions == nodes[0]
+    cell = np.clip(np.searchsorted(nodes, positions, side="right") - 1, 0, len(nodes) - 2)
+    share = (positions - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
+    at_node, at_next = abs(share) <= AT_NODE, abs(share - 1) <= AT_NODE
+    inside = at_node | at_next | ((0 < share) & (share < 1))
+    return cell + at_next, np.where(inside & ~at_node & ~at_next, share, 0), inside
 
 
 # Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is reported in
