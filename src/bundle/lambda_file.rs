@@ -390,6 +390,9 @@ pub struct WorstPointStep {
 pub struct WorstPointAt {
     /// N.
     pub worst_error_n: f64,
+    /// Proof of optimality: no currents within the limits are better by more than this, N.
+    #[serde(default)]
+    pub gap_n: Option<f64>,
     /// A, one per coil of the array.
     pub currents_a: Vec<f64>,
 }

@@ -87,7 +87,8 @@ pub struct FineSamples<'a> {
 /// any unit), whether or not the problem weighs by it; `fine` takes the place of the points in cells
 /// that are not smooth. Of points on no grid (`places` is `None`) every fourth is taken, which is an
 /// estimate where they are spread at random. A rule without a constant, or with 0, differs by all of it; so it
-/// does where there is no rule to compare with: fewer than three points along an axis of several.
+/// does where there is no rule to compare with: fewer than three points along an axis of several. Of several rules
+/// those whose path cannot be followed are left out.
 ///
 /// # Errors
 /// A malformed problem.
@@ -110,24 +111,24 @@ pub fn limit_error(
     let with_samples = |fine: FineSamples| {
         Rows::of(problem, fine.point_areas, Some((fine, fine.areas))).constant(problem, &settings)
     };
-    let of_points = || match constant(&by_area, &settings) {
-        Err(ProblemError::TooWeak { .. }) => Ok(None),
-        other => Ok(other?.filter(|lambda| *lambda > 0.0)),
-    };
-    let by_points = of_points()?;
+    let by_points = Found::of(&by_area, &settings)?;
     let (areas, nearest) = match fine {
         Some(fine) => (fine.point_areas, with_samples(fine)?),
         None => (areas, by_points),
     };
-    let Some(nearest) = nearest else {
+    let Found::Constant(nearest) = nearest else {
         return Ok(ALL);
     };
-    let apart = |other: Option<f64>| other.map_or(ALL, |other| (other / nearest - 1.0).abs());
-    let differs = |points: &[f64], samples: Option<&[f64]>| -> Result<_, ProblemError> {
+    let apart = |other: Found| match other {
+        Found::Constant(other) => Some((other / nearest - 1.0).abs()),
+        Found::Nothing => Some(ALL),
+        Found::Unfollowed => None,
+    };
+    let differs = |points: &[f64], samples: Option<&[f64]>| -> Difference {
         let rows = Rows::of(problem, points, fine.zip(samples));
         Ok(apart(rows.constant(problem, &settings)?))
     };
-    let of_cells = apart(by_points);
+    let of_cells = apart(by_points).unwrap_or(ALL);
     let subsets: Vec<usize> = (0..SUBSETS).collect();
     let of_spacing = match places {
         // The least over places: the one that decides may be a sample, or a corner of every block.
@@ -141,7 +142,10 @@ pub fn limit_error(
         })?,
     };
     let of_samples = match fine {
-        Some(fine) => differs(areas, Some(fine.coarse_areas))? + of_choice(areas, fine, differs)?,
+        Some(fine) => {
+            let coarse = differs(areas, Some(fine.coarse_areas))?.unwrap_or(ALL);
+            coarse + of_choice(areas, fine, differs)?
+        }
         None => 0.0,
     };
     let off = (lambda_n_per_m / nearest - 1.0).abs();
@@ -156,7 +160,7 @@ pub fn limit_error(
 fn of_choice(
     areas: &[f64],
     fine: FineSamples,
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<f64, ProblemError> + Sync,
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Difference + Sync,
 ) -> Result<f64, ProblemError> {
     if fine.stand_in.iter().all(Option::is_none) {
         return Ok(0.0);
@@ -170,7 +174,7 @@ fn spacing_off(
     places: GridPlaces,
     areas: &[f64],
     (of_cells, fine): (f64, Option<FineSamples>),
-    differs: impl Fn(&[f64], Option<&[f64]>) -> Result<f64, ProblemError> + Sync,
+    differs: impl Fn(&[f64], Option<&[f64]>) -> Difference + Sync,
 ) -> Result<f64, ProblemError> {
     let ways = (0..SUBSETS).map(|which| places.blocks(areas, which));
     let ways: Vec<(Vec<f64>, f64)> = ways.collect();
@@ -191,17 +195,23 @@ fn spacing_off(
     }
     let ways: Vec<_> = (ways.iter().filter(|(_, share)| *share > 0.5 * most)).collect();
     largest(&ways, |(weights, share)| {
-        Ok(differs(weights, fine.map(|fine| fine.areas))? / share)
+        let off = differs(weights, fine.map(|fine| fine.areas))?;
+        Ok(off.map(|off| off / share))
     })
 }
 
-/// The largest value of `off` over all `ways`, which are looked at side by side.
+/// By how much a rule's constant differs, relative; `None` where its path cannot be followed.
+type Difference = Result<Option<f64>, ProblemError>;
+
+/// The largest value of `off` over all `ways`, which are looked at side by side, those that are not known left out.
 fn largest<T: Sync>(
     ways: &[T],
-    off: impl Fn(&T) -> Result<f64, ProblemError> + Sync,
+    off: impl Fn(&T) -> Difference + Sync,
 ) -> Result<f64, ProblemError> {
     let found: Vec<_> = ways.par_iter().map(&off).collect();
-    (found.into_iter()).try_fold(0.0_f64, |most, off| Ok(most.max(off?)))
+    let found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let most = found.into_iter().flatten().reduce(f64::max);
+    Ok(most.unwrap_or(ALL))
 }
 
 /// The weights of the `which`-th of every `count` points.
@@ -335,6 +345,29 @@ impl GridPlaces<'_> {
     }
 }
 
+/// The force constant of a rule.
+#[derive(Clone, Copy)]
+enum Found {
+    Constant(f64),
+    /// None, or 0.
+    Nothing,
+    Unfollowed,
+}
+
+impl Found {
+    fn of(problem: &ForceProblem, settings: &Settings) -> Result<Self, ProblemError> {
+        match constant(problem, settings) {
+            // Too weak at these points alone.
+            Err(ProblemError::TooWeak { .. }) => Ok(Self::Nothing),
+            Err(ProblemError::Unfollowed) => Ok(Self::Unfollowed),
+            other => Ok(match other? {
+                Some(lambda) if lambda > 0.0 => Self::Constant(lambda),
+                _ => Self::Nothing,
+            }),
+        }
+    }
+}
+
 /// The points of a problem whose weight is above zero, and samples beside them.
 struct Rows {
     forces_n_per_a: Vec<f64>,
@@ -377,13 +410,9 @@ impl Rows {
         all
     }
 
-    fn constant(
-        &self,
-        problem: &ForceProblem,
-        settings: &Settings,
-    ) -> Result<Option<f64>, ProblemError> {
+    fn constant(&self, problem: &ForceProblem, settings: &Settings) -> Result<Found, ProblemError> {
         if self.height_m.is_empty() {
-            return Ok(None);
+            return Ok(Found::Nothing);
         }
         let rows = ForceProblem {
             forces_n_per_a: &self.forces_n_per_a,
@@ -392,10 +421,6 @@ impl Rows {
             weights: Some(&self.weights),
             ..*problem
         };
-        match constant(&rows, settings) {
-            // Too weak at these points alone.
-            Err(ProblemError::TooWeak { .. }) => Ok(None),
-            other => Ok(other?.filter(|lambda| *lambda > 0.0)),
-        }
+        Found::of(&rows, settings)
     }
 }

@@ -119,6 +119,11 @@ pub enum ProblemError {
         /// Its largest force, N.
         strongest_n: f64,
     },
+    /// A path that ended before the force constant.
+    #[error(
+        "the path over lambda could not be followed as far as the force constant; please report this design and shape"
+    )]
+    Unfollowed,
     /// Infinite or not a number.
     #[error("{name}[{index}] is {value}: only finite numbers can be used")]
     NotFinite {

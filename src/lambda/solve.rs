@@ -320,11 +320,12 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
     problem.comparable(&largest)?;
     let (solved, rank, _) = solve_paths(problem, &largest, Extent::of(settings));
     let comparison = solved.comparison();
-    if status(&solved, &comparison) == Status::NothingRendered {
+    let status = status(&solved, &comparison);
+    if status == Status::NothingRendered {
         return Ok(None);
     }
     let (linear, jnd) = first_and_jnd(settings, &solved, &comparison, rank);
-    Ok(match settings.criterion {
+    let lambda = match settings.criterion {
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
         Criterion::Saturation => {
@@ -332,7 +333,11 @@ pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f6
             path.last_turn().or(linear.filter(|&lambda| lambda == 0.0))
         }
         Criterion::Maxmin => worst::largest(problem, &largest).map(|most| most.lambda_n_per_m),
-    })
+    };
+    if lambda.is_none() && status == Status::Stalled {
+        return Err(ProblemError::Unfollowed);
+    }
+    Ok(lambda)
 }
 
 /// The root of the mean square error at a force constant above zero, relative to that of the requested force, as

@@ -147,8 +147,8 @@ impl SceneIron {
                 };
                 if let Some(at) = meeting_m(&piece.body, &room, 0.0) {
                     return Err(RunError::Input(format!(
-                        "{name} cuts the winding of coil {coil} or its bore, whose steel is [core], at {}; move it or \
-                         make it smaller",
+                        "{name} cuts the winding of coil {coil} or its bore, which [core] alone may fill, at {}; move it \
+                         or make it smaller",
                         place_mm(at)
                     )));
                 }

@@ -127,3 +127,45 @@ fn the_table_of_points_states_the_area_of_each() {
     let disc = std::f64::consts::PI * 0.0413 * 0.0413;
     assert!((area / disc - 1.0).abs() < 3e-3, "{area} of {disc}");
 }
+
+/// Errors of patches as wide as the deviation allows and of those as wide as may be have opposite signs on a turned box:
+/// their sum was stated, which was nearly nothing.
+#[test]
+fn errors_of_opposite_signs_are_both_stated() {
+    let place = Place::new();
+    place.write(
+        "desk.toml",
+        "name = \"desk\"\n[coil]\ninner_diameter_mm = 8\nouter_diameter_mm = 26\nlength_mm = 40\nturns = 918\n\
+         [wire]\ndiameter_mm = 0.56\n[array]\nrows = 3\ncolumns = 3\npitch_mm = 28\n[magnet]\n\
+         magnetization_a_per_m = 1e6\n[supply]\ncurrent_max_a = 2\nvoltage_v = 24\n[workspace]\n\
+         x_mm = [-30, 30, 31]\ny_mm = [-30, 30, 31]\nz_mm = [8, 48, 21]\n",
+    );
+    let corners = "v -11 -5 -6\nv -11 -5 6\nv -11 5 -6\nv -11 5 6\nv 11 -5 -6\nv 11 -5 6\nv 11 5 -6\nv 11 5 6\n";
+    let faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+    place.write("box.obj", &format!("{corners}{faces}"));
+    let solved = |flags: &[&str]| {
+        let args = [
+            "lambda",
+            "desk.toml",
+            "box.obj",
+            "--unit",
+            "mm",
+            "--center",
+            "--rest-on",
+            "12mm",
+        ];
+        let turned = ["--rotate=68,30,32", "--format", "json"];
+        place.run(&[&args[..], &turned, flags].concat()).json()
+    };
+    let area = solved(&["--grid", "301x301", "--weights", "area"]);
+    assert!(stated(&area) < 1e-3);
+    for width in [&[][..], &["--max-width", "3mm"]] {
+        let patches = solved(&[&["--max-deviation", "0.3mm"], width].concat());
+        let off = (lambda(&patches) / lambda(&area) - 1.0).abs();
+        assert!(
+            off < stated(&patches) + stated(&area),
+            "{off} {}",
+            stated(&patches)
+        );
+    }
+}

@@ -627,3 +627,43 @@ fn turns_report_the_change_of_the_currents() {
         .expect("the coil meets its limit");
     assert!((meets.lambda_n_per_m - 0.7 * 1.3 / 0.05).abs() < 1e-9);
 }
+
+/// Of so many coils side by side neither the path nor the constants may be found, since without limits currents are huge;
+/// no currents at all were given then as the best at any force constant.
+#[test]
+fn where_the_constants_are_not_found_the_error_at_one_is() {
+    let mut random = Random::new(1301);
+    let place = |k: usize, side: usize, pitch: f64| {
+        let at = |i: usize| pitch * (i as f64 - 0.5 * (side - 1) as f64);
+        [at(k % side), at(k / side)]
+    };
+    let coils: Vec<[f64; 2]> = (0..169)
+        .map(|k| place(k, 13, 0.015).map(|x| x + random.between(-4.5e-4, 4.5e-4)))
+        .collect();
+    let (mut forces, mut heights) = (Vec::new(), Vec::new());
+    for [x, y] in (0..169).map(|k| place(k, 13, 0.0075)) {
+        let height: f64 = 0.025 + 0.1 * x + 0.05 * y + 0.005 * (50.0 * x).sin() * (40.0 * y).cos();
+        heights.push(height);
+        for [u, v] in &coils {
+            // A magnet's axial force above a dipole.
+            let square = (x - u).powi(2) + (y - v).powi(2);
+            let z = height;
+            forces.push(1e-8 * z * (2.0 * z * z - 3.0 * square) / (square + z * z).powf(3.5));
+        }
+    }
+    let case = Case {
+        forces,
+        heights,
+        offset: None,
+        lower: (0..169).map(|_| -random.between(0.0, 1.0)).collect(),
+        upper: (0..169).map(|_| random.between(0.8, 2.0)).collect(),
+        total: Some(118.0),
+        ohm: vec![6.0; 169],
+    };
+    let solution = solved(&case);
+    assert!(!solution.complete, "{solution:?}");
+    let point = solution.at(&case.problem(), 1.8);
+    let requested = 1.8 * top(&case);
+    assert!(point.worst_error_n < 0.5 * requested);
+    assert!(point.gap_n < 1e-9 * point.worst_error_n, "{}", point.gap_n);
+}

@@ -30,7 +30,7 @@ use self::headline::Amplification;
 use self::placement::Placed;
 pub(crate) use self::points::{ForcePoints, ForcesAt};
 pub(crate) use self::points_effect::error_of_points;
-use super::discretize::scattered::{self, ScatteredReport, ScatteredSummary};
+use super::discretize::scattered::{self, ScatteredSummary};
 use super::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
@@ -265,13 +265,15 @@ pub fn run(
         .map(|how| resolving(how, of_grid.lowest_m()));
     let sample = |how| scattered::run(document, inputs.clone(), how, progress);
     let sampled = sampling.map(sample).transpose()?;
-    let points_of = |report: &Option<ScatteredReport>| {
-        (report.as_ref().map(ForcePoints::of_scattered)).transpose()
+    let chosen = (sampled.as_ref().map(ForcePoints::of_scattered)).transpose()?;
+    let others = match sampling.zip(chosen.as_ref()) {
+        Some((how, chosen)) => {
+            other_patches(how, chosen, |how| ForcePoints::of_scattered(&sample(how)?))?
+        }
+        None => Vec::new(),
     };
-    let chosen = points_of(&sampled)?;
-    let coarser = points_of(&sampling.and_then(coarser).map(sample).transpose()?)?;
-    let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
-    let lowest_m = lowest_place_m(&scene, &of_all, options);
+    let of_all = [&of_grid].into_iter().chain(&chosen).chain(&others);
+    let lowest_m = lowest_place_m(&scene, of_all, options);
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
@@ -312,10 +314,10 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = whole(&chosen)?;
-    // Where patches are as wide as the deviation already, twice as wide ones are the same.
-    if let Some(coarser) = coarser.filter(|other| other.positions_m != chosen.positions_m) {
-        let other = solve_with(&coarser, &plain)?.file;
-        report.add_quadrature(quadrature(&report.file, &other));
+    if !others.is_empty() {
+        let others = others.iter().map(|points| solve_with(points, &plain));
+        let others = others.collect::<Result<Vec<_>, RunError>>()?;
+        report.add_quadrature(quadrature(&report.file, &others));
     } else if !report.file.accuracy.contains_key("lambda_of_points") {
         report.add_quadrature(off_grid(&report.file, &grid));
     }
@@ -324,9 +326,12 @@ pub fn run(
 }
 
 /// The lowest of all places: the steel is solved once, for it.
-fn lowest_place_m(scene: &Scene, of_all: &[Option<&ForcePoints>], options: &LambdaOptions) -> f64 {
-    let lowest = of_all.iter().flatten();
-    let lowest = lowest.map(|points| points.lowest_place_m(&scene.design.workspace));
+fn lowest_place_m<'a>(
+    scene: &Scene,
+    of_all: impl Iterator<Item = &'a ForcePoints>,
+    options: &LambdaOptions,
+) -> f64 {
+    let lowest = of_all.map(|points| points.lowest_place_m(&scene.design.workspace));
     let lowest_m = lowest.fold(f64::INFINITY, f64::min);
     let feedback = options.feedback;
     feedback.map_or(lowest_m, |feedback| feedback.lowest_m(scene, lowest_m))
@@ -397,27 +402,47 @@ pub(crate) fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
     }
 }
 
-/// Patches twice as wide, on curved surfaces too; `None` for random points.
-fn coarser(how: Sampling) -> Option<Sampling> {
-    match how {
-        Sampling::Adaptive {
-            max_deviation_m,
-            widest_m: Some(widest_m),
-        } => Some(Sampling::Adaptive {
-            max_deviation_m: 4.0 * max_deviation_m,
-            widest_m: Some(2.0 * widest_m),
-        }),
-        Sampling::Adaptive { widest_m: None, .. } | Sampling::Poisson { .. } => None,
+/// Points of patches twice as wide where the deviation decides, and where the width does: errors of both may have
+/// opposite signs. Where the width decides of few patches, which may be whole faces already, of half that width. None
+/// for random points, nor where they are the same as the `chosen`.
+fn other_patches(
+    how: Sampling,
+    chosen: &ForcePoints,
+    points_of: impl Fn(Sampling) -> Result<ForcePoints, RunError>,
+) -> Result<Vec<ForcePoints>, RunError> {
+    let Sampling::Adaptive {
+        max_deviation_m,
+        widest_m: Some(widest_m),
+    } = how
+    else {
+        return Ok(Vec::new());
+    };
+    let points = |deviations: f64, widths: f64| {
+        points_of(Sampling::Adaptive {
+            max_deviation_m: deviations * max_deviation_m,
+            widest_m: Some(widths * widest_m),
+        })
+    };
+    let mut wider = points(1.0, 2.0)?;
+    if 2 * wider.positions_m.len() > chosen.positions_m.len() {
+        wider = points(1.0, 0.5)?;
     }
+    let mut others = vec![points(4.0, 1.0)?, wider];
+    others.retain(|other| other.positions_m != chosen.positions_m);
+    Ok(others)
 }
 
 /// How far lambda is off because forces between the points do not enter it.
-fn quadrature(file: &LambdaFile, coarser: &LambdaFile) -> Option<StageAccuracy> {
-    let (fine, coarse) = file.lambda_n_per_m.zip(coarser.lambda_n_per_m)?;
-    (fine > 0.0).then(|| StageAccuracy {
-        estimate: 1.5 * (coarse / fine - 1.0).abs(),
+fn quadrature(file: &LambdaFile, others: &[LambdaReport]) -> Option<StageAccuracy> {
+    let fine = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0)?;
+    let changes = others
+        .iter()
+        .map(|other| Some((other.file.lambda_n_per_m? / fine - 1.0).abs()));
+    Some(StageAccuracy {
+        estimate: 1.5 * changes.sum::<Option<f64>>()?,
         relative_to: "lambda".to_owned(),
-        method: "an estimate: one and a half times the change from patches twice as wide"
+        method: "an estimate: one and a half times the changes from patches of other widths, where the deviation decides \
+                 and where the width does"
             .to_owned(),
     })
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::PosedProblem;
 use super::accuracy::forces_accuracy;
 use crate::RunError;
+use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{
     AtLambda, LambdaFile, PathStep, TolerancePoint, WorstPointAt, WorstPointFile, WorstPointStep,
@@ -30,11 +31,15 @@ impl PosedProblem<'_> {
             &points.positions_m,
             self.unwired.forces_n_per_a,
         )?;
+        let worst_point = self.worst_point(solution, worst);
         let accuracy = BTreeMap::from([
             ("points".to_owned(), points.accuracy["points"].clone()),
             ("forces".to_owned(), forces),
             ("lambda".to_owned(), solution.accuracy.clone()),
-            ("worst_point".to_owned(), worst.accuracy.clone()),
+            (
+                "worst_point".to_owned(),
+                worst_accuracy(worst, &worst_point),
+            ),
         ]);
         let mut file = LambdaFile {
             schema_version: SCHEMA_VERSION.to_owned(),
@@ -56,7 +61,7 @@ impl PosedProblem<'_> {
             weights: points.rule,
             path: solution.path.breakpoints().into_iter().map(step).collect(),
             at: solution.at.as_ref().map(|point| self.at(point, worst)),
-            worst_point: Some(self.worst_point(solution, worst)),
+            worst_point: Some(worst_point),
             sampling: None,
             tolerance: Some(self.perceptual_tolerance()?),
             wiring: (!self.options.wiring.is_plain()).then(|| self.options.wiring.clone()),
@@ -110,6 +115,7 @@ impl PosedProblem<'_> {
             worst_error_n: point.worst_error_n,
             worst_point: Some(WorstPointAt {
                 worst_error_n: least.worst_error_n,
+                gap_n: Some(least.gap_n),
                 currents_a: least.currents_a,
             }),
         }
@@ -172,6 +178,22 @@ impl PosedProblem<'_> {
             part: largest.map(|largest| largest.part),
             currents_a: largest.map(|largest| largest.currents_a.clone()),
         })
+    }
+}
+
+/// The error of the constants for the worst point; where none are known that of the error at the chosen one.
+fn worst_accuracy(worst: &WorstSolution, at: &WorstPointFile) -> StageAccuracy {
+    if worst.complete {
+        return worst.accuracy.clone();
+    }
+    let share = |gap_n: f64| {
+        let [relative, error_n] = [at.relative_worst_error?, at.worst_error_n?];
+        (error_n > 0.0).then(|| gap_n / error_n * relative)
+    };
+    StageAccuracy {
+        estimate: at.gap_n.and_then(share).unwrap_or_default(),
+        method: "gap of the proof of the largest error at the chosen lambda".to_owned(),
+        ..worst.accuracy.clone()
     }
 }
 

@@ -16,6 +16,9 @@ use crate::lambda::feedback::Rendered;
 use crate::lambda::vector_feedback::VectorRendering;
 use crate::lambda::{Criterion, Precision, Wiring};
 
+/// Share of the least largest error from which on what is not proven of it is stated.
+const UNPROVEN: f64 = 1e-3;
+
 /// The result for people.
 pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaReport) -> String {
     let file = &report.file;
@@ -112,7 +115,7 @@ fn headline_lines<'a>(sheet: &mut Sheet, file: &'a LambdaFile) -> Option<&'a Fel
 /// Currents and errors at the lambda of `--at`.
 fn at_lines(sheet: &mut Sheet, design: &Design, at: &AtLambda) {
     let least = at.worst_point.as_ref().map_or_else(String::new, |worst| {
-        format!(", at least {}", force(worst.worst_error_n))
+        format!(", {}", least_error(worst.worst_error_n, worst.gap_n))
     });
     let text = format!(
         "{} N/m: error rms {}, worst {}{least}",
@@ -377,6 +380,17 @@ fn table_of(variants: &[LambdaVariant]) -> String {
     headed_table(variants.iter().map(row))
 }
 
+/// The least largest error, as far as it is proven.
+fn least_error(worst_error_n: f64, gap_n: Option<f64>) -> String {
+    let gap_n = gap_n.unwrap_or(0.0);
+    if gap_n > UNPROVEN * worst_error_n {
+        let (least, given) = (force(worst_error_n - gap_n), force(worst_error_n));
+        format!("at least {least}, {given} with the best currents found")
+    } else {
+        format!("at least {}", force(worst_error_n))
+    }
+}
+
 /// The result of currents for the worst point.
 fn worst_point(worst: &WorstPointFile) -> String {
     let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
@@ -384,7 +398,7 @@ fn worst_point(worst: &WorstPointFile) -> String {
         let relative = worst.relative_worst_error.map_or_else(String::new, |part| {
             format!(" ({} of the largest force)", percent(part))
         });
-        format!("error at least {}{relative}; ", force(least))
+        format!("error {}{relative}; ", least_error(least, worst.gap_n))
     });
     format!(
         "{least}lambda by the worst point: linear {}, jnd {} N/m",

@@ -57,12 +57,11 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
     warnings.extend(chosen.and_then(|chosen| unbounded_sum(problem, &chosen.currents_a)));
     if !worst.complete {
         warnings.push(
-            "the worst-point path could not be followed to its end: its numbers are not the \
-             minimum; please report this design and shape"
+            "the worst-point path could not be followed to its end: its force constants are not known, and its error at one \
+             is the least as far as its gap says; please report this design and shape"
                 .to_owned(),
         );
-    }
-    if worst.path.is_none() {
+    } else if worst.path.is_none() {
         warnings.push(
             "the worst-point path is left out: with so many coils, or so much symmetry, it turns \
              too often to be followed; its force constants and currents hold all the same"

@@ -193,18 +193,19 @@ pub fn worst_point(
         }
     }
     scaled.leeway = 0.0;
-    let nothing = || Followed {
-        pieces: Vec::new(),
-        rows: Vec::new(),
-        end: End::Stalled,
-        doubt: 0.0,
+    if let Some(paths) = paths.filter(both_sound) {
+        return Ok(read_off(problem, settings, &scaled, &paths));
+    }
+    let unknown = Constants {
+        linear: None,
+        jnd: None,
+        floor: None,
+        doubt: 1.0,
     };
-    let paths = paths.filter(both_sound).unwrap_or_else(|| Paths {
-        limited: nothing(),
-        unlimited: nothing(),
+    Ok(WorstSolution {
         complete: false,
-    });
-    Ok(read_off(problem, settings, &scaled, &paths))
+        ..without_path(&scaled, &unknown)
+    })
 }
 
 /// The constants on the followed paths.
