@@ -424,3 +424,16 @@ impl Rows {
         Found::of(&rows, settings)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rule whose path ends early was off by all of the force constant.
+    #[test]
+    fn rules_that_cannot_be_followed_are_left_out() {
+        let off = |which: &usize| Ok([Some(0.01), None, Some(0.03)][*which]);
+        assert_eq!(largest(&[0, 1, 2], off), Ok(0.03));
+        assert_eq!(largest(&[1], off), Ok(ALL));
+    }
+}

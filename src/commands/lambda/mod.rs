@@ -423,11 +423,11 @@ fn other_patches(
             widest_m: Some(widths * widest_m),
         })
     };
-    let mut wider = points(1.0, 2.0)?;
-    if 2 * wider.positions_m.len() > chosen.positions_m.len() {
-        wider = points(1.0, 0.5)?;
+    let mut by_width = points(1.0, 2.0)?;
+    if 2 * by_width.positions_m.len() > chosen.positions_m.len() {
+        by_width = points(1.0, 0.5)?;
     }
-    let mut others = vec![points(4.0, 1.0)?, wider];
+    let mut others = vec![points(4.0, 1.0)?, by_width];
     others.retain(|other| other.positions_m != chosen.positions_m);
     Ok(others)
 }

@@ -8,7 +8,10 @@ use super::surface::{Distance, Surface};
 use crate::dipole::potential;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 
+/// Of the kernel.
 const SCALE: f64 = 1.0 / (4.0 * PI);
+/// Most nodes along a panel's side.
+const MOST_ORDER: usize = 8;
 
 /// Places, nodes of the surface or off it.
 #[derive(Default)]
@@ -125,9 +128,6 @@ struct NearColumns<'a> {
     order: usize,
     columns: &'a mut [f64],
 }
-
-/// Most nodes along a panel's side.
-pub(super) const MOST_ORDER: usize = 8;
 
 impl Kernel for NearColumns<'_> {
     type Output = ();
