@@ -10,7 +10,7 @@ use super::bodies::{Coils, Iron};
 use super::clearance::is_within;
 use super::face::{Node, Point, SAME_M};
 use super::inductance::{Linkage, least_h};
-use super::parts::Halvings;
+use super::panel_columns::Targets;
 use super::potential::Branch;
 use super::surface::{Surface, mirrored};
 use super::system::{System, TooMany};
@@ -36,7 +36,7 @@ const DEEP: f64 = 0.98;
 /// Steps from the best node to the largest |B|.
 const CLIMBS: usize = 12;
 /// Places, one after the other along the surface, that share the parts of panels close to them.
-const NEIGHBOURS: usize = 32;
+const NEIGHBOURS: usize = 128;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
 
@@ -354,7 +354,7 @@ impl IronArray {
     /// A place on a winding's edge.
     pub fn field_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
         let layers = self.layers_at(currents_a);
-        self.field_of(place_m, currents_a, &layers, &mut Halvings::new())
+        Ok(self.fields_of(&[place_m], currents_a, &layers)?[0])
     }
 
     /// The largest error of B at `places_m`, off the surface, relative to |B| there, each of the coil that is nearest in
@@ -390,24 +390,30 @@ impl IronArray {
         self.layers.iter().map(of_image).collect()
     }
 
-    fn field_of<'a>(
-        &'a self,
-        place_m: Point,
+    /// B at `places_m` of the windings and of the `layers` of every image.
+    fn fields_of(
+        &self,
+        places_m: &[Point],
         currents_a: &[f64],
         layers: &[Vec<f64>],
-        halvings: &mut Halvings<'a>,
-    ) -> Result<Point, OnEdge> {
+    ) -> Result<Vec<Point>, OnEdge> {
         fluxform_base::progress::poll();
-        let mut sum = [0.0; 3];
+        let of_windings = places_m
+            .iter()
+            .map(|place_m| self.of_windings_t(*place_m, currents_a));
+        let mut sums = of_windings.collect::<Result<Vec<Point>, OnEdge>>()?;
+        let [cx, cy] = self.planes_m;
         for ([sx, sy], values) in self.images.iter().zip(layers) {
-            let [cx, cy] = self.planes_m;
-            let [x, y, z] = place_m;
-            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            let [bx, by, bz] = self.surface.field_near(own, values, halvings);
-            sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
+            let mut targets = Targets::default();
+            for [x, y, z] in places_m {
+                targets.push([cx + sx * (x - cx), cy + sy * (y - cy), *z], None);
+            }
+            let fields_t = self.surface.fields_t(&targets, values);
+            for (sum, [bx, by, bz]) in sums.iter_mut().zip(fields_t) {
+                *sum = [sum[0] + sx * bx, sum[1] + sy * by, sum[2] + bz];
+            }
         }
-        let of_windings = self.of_windings_t(place_m, currents_a)?;
-        Ok([0, 1, 2].map(|k| sum[k] + of_windings[k]))
+        Ok(sums)
     }
 
     fn of_windings_t(&self, place_m: Point, currents_a: &[f64]) -> Result<Point, OnEdge> {
@@ -551,8 +557,7 @@ impl IronArray {
         let other = coarser.own_peaks(currents_a, depths)?;
         let layers = coarser.layers_at(currents_a);
         let compare = |peak: &mut Peak, other: &Peak| -> Result<(), OnEdge> {
-            let halvings = &mut Halvings::new();
-            let here = norm(coarser.field_of(peak.place_m, currents_a, &layers, halvings)?);
+            let here = norm(coarser.fields_of(&[peak.place_m], currents_a, &layers)?[0]);
             let apart = |value_t: f64| (peak.field_t - value_t).abs();
             peak.error_t = Some(apart(here).max(apart(other.field_t)));
             Ok(())
@@ -567,7 +572,7 @@ impl IronArray {
     }
 
     /// The same, without errors.
-    fn own_peaks<'a>(&'a self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
+    fn own_peaks(&self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
         let mut nodes: Vec<Candidate> = Vec::new();
         for (image, signs) in self.images.iter().enumerate() {
             nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
@@ -596,17 +601,14 @@ impl IronArray {
             }
         }
         let layers = self.layers_at(currents_a);
-        let field_t = |place: Point, halvings: &mut Halvings<'a>| {
-            Ok(norm(self.field_of(place, currents_a, &layers, halvings)?))
+        let fields_t = |places_m: &[Point]| -> Result<Vec<f64>, OnEdge> {
+            let fields = self.fields_of(places_m, currents_a, &layers)?;
+            Ok(fields.into_iter().map(norm).collect())
         };
-        let of_neighbours = |candidates: &[&Candidate]| {
-            let mut halvings = Halvings::new();
-            let of_each = |candidate: &&Candidate| field_t(candidate.place_m, &mut halvings);
-            candidates.iter().map(of_each).collect()
-        };
-        let values = sparse
+        let places_m: Vec<Point> = sparse.iter().map(|candidate| candidate.place_m).collect();
+        let values = places_m
             .par_chunks(NEIGHBOURS)
-            .map(of_neighbours)
+            .map(fields_t)
             .collect::<Result<Vec<Vec<f64>>, OnEdge>>()?
             .concat();
         let cores = if nodes.iter().any(|node| node.core.is_some()) {
@@ -623,7 +625,7 @@ impl IronArray {
             }
         }
         let climb = |best: Option<(f64, &Candidate)>| {
-            let peak = best.map(|(value, from)| self.climb(value, from, &field_t));
+            let peak = best.map(|(value, from)| self.climb(value, from, &fields_t));
             peak.transpose()
         };
         let climbed = best.into_par_iter().map(climb);
@@ -647,11 +649,11 @@ impl IronArray {
     }
 
     /// From a node's place to the largest |B| about it, along the surface at the same depth.
-    fn climb<'a>(
-        &'a self,
+    fn climb(
+        &self,
         value_t: f64,
         from: &Candidate,
-        field_t: &impl Fn(Point, &mut Halvings<'a>) -> Result<f64, OnEdge>,
+        fields_t: &impl Fn(&[Point]) -> Result<Vec<f64>, OnEdge>,
     ) -> Result<Peak, OnEdge> {
         let face = self.surface.face_of(from.number);
         let [[mut u, mut v], mut step] = self.surface.parameters(from.number);
@@ -660,10 +662,10 @@ impl IronArray {
             place_m: from.place_m,
             error_t: None,
         };
-        let mut halvings = Halvings::new();
         for _ in 0..CLIMBS {
             let before = peak.field_t;
             let [du, dv] = step;
+            let (mut beside, mut places_m) = (Vec::new(), Vec::new());
             for [a, b] in [[u + du, v], [u - du, v], [u, v + dv], [u, v - dv]] {
                 if !(0.0..=1.0).contains(&a) || !(0.0..=1.0).contains(&b) {
                     continue;
@@ -672,12 +674,15 @@ impl IronArray {
                 let node = Node { place_m, area_m2 };
                 let node = mirrored(&node, self.images[from.image], self.planes_m);
                 let place_m = inside(&node, from.depth_m);
-                if !self.is_deep(place_m, from.depth_m) {
-                    continue;
+                if self.is_deep(place_m, from.depth_m) {
+                    beside.push([a, b]);
+                    places_m.push(place_m);
                 }
-                let value = field_t(place_m, &mut halvings)?;
+            }
+            let values = fields_t(&places_m)?;
+            for ((at, place_m), value) in beside.into_iter().zip(places_m).zip(values) {
                 if value > peak.field_t {
-                    (u, v) = (a, b);
+                    [u, v] = at;
                     (peak.field_t, peak.place_m) = (value, place_m);
                 }
             }

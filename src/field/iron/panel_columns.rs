@@ -1,4 +1,5 @@
-//! What the layers on the nodes of a panel give at many places: int n'.(x - y) / (4 pi |x - y|^3) v(y) dS.
+//! What the layers on the nodes of panels give at many places: the potential int n'.(x - y) / (4 pi |x - y|^3) v(y) dS,
+//! and its field.
 
 use std::f64::consts::PI;
 
@@ -6,6 +7,7 @@ use super::face::{Node, Point};
 use super::parts::{Parts, Place, Rule};
 use super::surface::{Distance, Surface};
 use crate::dipole::potential;
+use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 
 /// Of the kernel.
@@ -85,6 +87,86 @@ impl Surface {
                 columns,
             });
         });
+    }
+}
+
+impl Surface {
+    /// B of the layer `values`, one per node, at a place off the surface, T.
+    #[must_use]
+    pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
+        let mut target = Targets::default();
+        target.push(target_m, None);
+        self.fields_t(&target, values)[0]
+    }
+
+    /// The same at `targets`.
+    pub(super) fn fields_t(&self, targets: &Targets, values: &[f64]) -> Vec<Point> {
+        let mut fields_t = vec![[0.0; 3]; targets.count()];
+        let place = |target: usize| (targets.place_m(target), Place::OffPanel);
+        for panel in 0..self.panels().len() {
+            fluxform_base::progress::poll();
+            let nodes = self.nodes_of(panel);
+            let values = &values[nodes.clone()];
+            let is_far = |target: &usize| self.is_far(panel, targets.place_m(*target));
+            let (far, mut near): (Vec<_>, Vec<_>) = (0..targets.count()).partition(is_far);
+            dispatch::run(Fields {
+                targets,
+                some: &far,
+                nodes: &self.nodes[nodes],
+                values,
+                fields_t: &mut fields_t,
+            });
+            if near.is_empty() {
+                continue;
+            }
+            let mut parts: Parts<'_> = self.parts_of(panel);
+            parts.visit_all(&place, &mut near, &mut |rule, some| {
+                dispatch::run(Fields {
+                    targets,
+                    some,
+                    nodes: &rule.nodes,
+                    values: &rule.interpolated(values),
+                    fields_t: &mut fields_t,
+                });
+            });
+        }
+        fields_t
+    }
+}
+
+/// B that nodes with a layer give, added to that of some targets.
+struct Fields<'a> {
+    targets: &'a Targets,
+    some: &'a [usize],
+    nodes: &'a [Node],
+    values: &'a [f64],
+    fields_t: &'a mut [Point],
+}
+
+impl Kernel for Fields<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        for some in self.some.chunks(LANES) {
+            let at = self.targets.lanes(some);
+            let mut sums = [Lanes::splat(0.0); 3];
+            for (node, value) in self.nodes.iter().zip(self.values) {
+                let (y, n) = (node.place_m, node.area_m2);
+                let d = [at[0] - y[0], at[1] - y[1], at[2] - y[2]];
+                let square = d[0].mul_add::<FMA>(d[0], d[1].mul_add::<FMA>(d[1], d[2] * d[2]));
+                let size = Lanes::splat(MU_0_T_M_PER_A * SCALE * value) / (square * square.sqrt());
+                let along = (d[0] * n[0] + d[1] * n[1] + d[2] * n[2]) * 3.0 / square;
+                for ((sum, d), n) in sums.iter_mut().zip(d).zip(n) {
+                    *sum = *sum + size * (Lanes::splat(n) - along * d);
+                }
+            }
+            for (lane, target) in some.iter().enumerate() {
+                for (field, sum) in self.fields_t[*target].iter_mut().zip(&sums) {
+                    *field += sum.0[lane];
+                }
+            }
+        }
     }
 }
 

@@ -1,8 +1,6 @@
 //! The parts into which a panel is halved towards places close to it, with their nodes: kept from one place to the
 //! next, because places near each other take mostly the same ones.
 
-use std::collections::BTreeMap;
-
 use super::face::{Face, Node, Panel, Point};
 use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
@@ -30,9 +28,6 @@ pub(super) struct Parts<'a> {
     /// The whole panel first.
     parts: Vec<Part>,
 }
-
-/// Those of the panels of a surface that places were close to, by their numbers.
-pub(super) type Halvings<'a> = BTreeMap<usize, Parts<'a>>;
 
 struct Part {
     panel: Panel,
@@ -174,5 +169,23 @@ impl Rule {
             nodes: part.nodes(face, [order; 2]),
             bases: [values(0), values(1)],
         }
+    }
+
+    /// The layer at its nodes, of `values` at those of the whole panel.
+    pub(super) fn interpolated(&self, values: &[f64]) -> Vec<f64> {
+        let [first, second] = &self.bases;
+        let count = first.len() / self.order;
+        let sum = |of: &[f64], with: &[f64]| of.iter().zip(with).map(|(a, b)| a * b).sum::<f64>();
+        let mut out = Vec::with_capacity(self.nodes.len());
+        let mut line = vec![0.0; count];
+        for first in first.chunks_exact(count) {
+            for (b, value) in line.iter_mut().enumerate() {
+                *value = (first.iter().zip(values.chunks_exact(count)))
+                    .map(|(a, row)| a * row[b])
+                    .sum();
+            }
+            out.extend(second.chunks_exact(count).map(|second| sum(second, &line)));
+        }
+        out
     }
 }

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
 use super::near_windings::Windings;
-use super::parts::{Halvings, Parts, Place, coordinate_rounding_m};
+use super::parts::{Parts, Place, coordinate_rounding_m};
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
@@ -108,8 +108,8 @@ impl Surface {
     }
 
     /// How a place lies to a panel.
-    pub(super) fn distance_class(&self, panel: usize, target_m: Point) -> Distance {
-        let panel = &self.panels[panel];
+    pub(super) fn distance_class(&self, number: usize, target_m: Point) -> Distance {
+        let panel = &self.panels[number];
         let away = minus(target_m, panel.centre_m);
         let distance = norm(away);
         // What lies in the panel's plane; of a small body far from the origin as its coordinates round.
@@ -120,12 +120,18 @@ impl Surface {
         if panel.plane.is_some_and(is_in) {
             return Distance::InPlane;
         }
-        let half = 0.5 * panel.sides_m[0].max(panel.sides_m[1]);
-        if distance - panel.radius_m > FAR * half {
+        if self.is_far(number, target_m) {
             Distance::Far
         } else {
             Distance::Near
         }
+    }
+
+    /// Whether the nodes of a panel are enough to integrate what it gives at a place.
+    pub(super) fn is_far(&self, panel: usize, target_m: Point) -> bool {
+        let panel = &self.panels[panel];
+        let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
+        distance > FAR * 0.5 * panel.sides_m[0].max(panel.sides_m[1])
     }
 
     /// The panels, one after the other.
@@ -159,31 +165,11 @@ impl Surface {
         &self.bases[self.panels[panel].order - 1]
     }
 
-    /// B of the layer `values`, one per node, at a place off the surface, T.
-    #[must_use]
-    pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
-        self.field_near(target_m, values, &mut Halvings::new())
-    }
-
-    /// The same with the parts of panels that places before it took.
-    pub(super) fn field_near<'a>(
-        &'a self,
-        target_m: Point,
-        values: &[f64],
-        halvings: &mut Halvings<'a>,
-    ) -> Point {
-        let mut sum = [0.0; 3];
-        self.elements(target_m, values, halvings, |node, value| {
-            add_dipole(target_m, node, value, &mut sum);
-        });
-        sum
-    }
-
-    /// The same with its gradient.
+    /// B of the layer `values`, one per node, at a place off the surface, and its gradient.
     #[must_use]
     pub(super) fn induced(&self, target_m: Point, values: &[f64]) -> Induced {
         let mut sum = Induced::default();
-        self.elements(target_m, values, &mut Halvings::new(), |node, value| {
+        self.elements(target_m, values, |node, value| {
             let strength = MU_0_T_M_PER_A * value / (4.0 * PI);
             sum.add_element(minus(target_m, node.place_m), node.area_m2, strength);
         });
@@ -192,36 +178,22 @@ impl Surface {
 
     /// Visits nodes with the layer `values` there, close enough to integrate what they give at a place off
     /// the surface.
-    fn elements<'a>(
-        &'a self,
-        target_m: Point,
-        values: &[f64],
-        halvings: &mut Halvings<'a>,
-        mut visit: impl FnMut(&Node, f64),
-    ) {
-        for (number, (panel, first)) in self.panels.iter().zip(&self.firsts).enumerate() {
-            let count = panel.order;
-            let own = *first..first + count * count;
+    fn elements(&self, target_m: Point, values: &[f64], mut visit: impl FnMut(&Node, f64)) {
+        for panel in 0..self.panels.len() {
+            let own = self.nodes_of(panel);
             let values = &values[own.clone()];
-            let distance = norm(minus(target_m, panel.centre_m)) - panel.radius_m;
-            if distance > FAR * 0.5 * panel.sides_m[0].max(panel.sides_m[1]) {
-                for (value, node) in values.iter().zip(&self.nodes[own]) {
-                    visit(node, *value);
-                }
+            let mut visit_all = |values: &[f64], nodes: &[Node]| {
+                values
+                    .iter()
+                    .zip(nodes)
+                    .for_each(|(v, node)| visit(node, *v));
+            };
+            if self.is_far(panel, target_m) {
+                visit_all(values, &self.nodes[own]);
                 continue;
             }
-            let parts = halvings
-                .entry(number)
-                .or_insert_with(|| self.parts_of(number));
-            parts.visit(target_m, &mut |rule| {
-                for (k, node) in rule.nodes.iter().enumerate() {
-                    let first = &rule.bases[0][k / rule.order * count..][..count];
-                    let second = &rule.bases[1][k % rule.order * count..][..count];
-                    let value: f64 = (first.iter().zip(values.chunks_exact(count)))
-                        .map(|(a, row)| a * row.iter().zip(second).map(|(v, b)| v * b).sum::<f64>())
-                        .sum();
-                    visit(node, value);
-                }
+            self.parts_of(panel).visit(target_m, &mut |rule| {
+                visit_all(&rule.interpolated(values), &rule.nodes);
             });
         }
     }
@@ -379,16 +351,5 @@ pub(super) fn mirrored(node: &Node, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> N
     Node {
         place_m: [cx + sx * (x - cx), cy + sy * (y - cy), z],
         area_m2: [sx * ax, sy * ay, az],
-    }
-}
-
-/// Adds B of a layer's element, that of the moment -v n dS.
-fn add_dipole(target_m: Point, node: &Node, value: f64, sum: &mut Point) {
-    let d = minus(target_m, node.place_m);
-    let square = dot(d, d);
-    let scale = MU_0_T_M_PER_A * value / (4.0 * PI * square * square.sqrt());
-    let along = 3.0 * dot(node.area_m2, d) / square;
-    for (i, sum) in sum.iter_mut().enumerate() {
-        *sum += scale * (node.area_m2[i] - along * d[i]);
     }
 }
