@@ -118,8 +118,7 @@ fn the_whole_coil_that_misses_least_has_its_own_bore() {
     );
 }
 
-/// Where the supply's voltage sets the current no coil settles in time, and without that limit each one was looked at:
-/// an hour's work for what less than two thousand boxes prove.
+/// Where the supply's voltage sets the current no coil settles in time, and without that limit each one was looked at.
 #[test]
 fn a_regime_without_a_coil_does_not_hold_up_the_proof_of_another() {
     let place = Place::new();

@@ -188,10 +188,14 @@ fn worst_accuracy(worst: &WorstSolution, at: &WorstPointFile) -> StageAccuracy {
     }
     let share = |gap_n: f64| {
         let [relative, error_n] = [at.relative_worst_error?, at.worst_error_n?];
-        (error_n > 0.0).then(|| gap_n / error_n * relative)
+        Some(if error_n > 0.0 {
+            gap_n / error_n * relative
+        } else {
+            0.0
+        })
     };
     StageAccuracy {
-        estimate: at.gap_n.and_then(share).unwrap_or_default(),
+        estimate: at.gap_n.and_then(share).unwrap_or(worst.accuracy.estimate),
         method: "gap of the proof of the largest error at the chosen lambda".to_owned(),
         ..worst.accuracy.clone()
     }

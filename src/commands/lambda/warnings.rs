@@ -57,8 +57,9 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
     warnings.extend(chosen.and_then(|chosen| unbounded_sum(problem, &chosen.currents_a)));
     if !worst.complete {
         warnings.push(
-            "the worst-point path could not be followed to its end: its force constants are not known, and its error at one \
-             is the least as far as its gap says; please report this design and shape"
+            "neither the worst-point path could be followed to its end nor its force constants be solved for without it: \
+             they are not known; the least error at the chosen lambda is proven to within its gap; please report this \
+             design and shape"
                 .to_owned(),
         );
     } else if worst.path.is_none() {

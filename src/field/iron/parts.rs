@@ -1,5 +1,5 @@
-//! The parts into which a panel is halved towards places close to it, with their nodes: kept from one place to the
-//! next, because places near each other take mostly the same ones.
+//! The parts into which a panel is halved towards places close to it, with their nodes: taken for many places
+//! together, because places near each other take mostly the same ones.
 
 use super::face::{Face, Node, Panel, Point};
 use fluxform_numerics::gauss;

@@ -100,8 +100,8 @@ pub struct WorstSolution {
     /// t* and the currents anywhere; `None` where the path was left out as too much work: the
     /// constants were solved for without it.
     pub path: Option<WorstPath>,
-    /// False where the path could not be followed to its end, nor the constants be solved for
-    /// without it.
+    /// False where neither the path could be followed to its end nor the constants be solved for
+    /// without it: none are known.
     pub complete: bool,
     /// Estimated error of t*.
     pub accuracy: StageAccuracy,
@@ -193,9 +193,7 @@ pub fn worst_point(
         }
     }
     scaled.leeway = 0.0;
-    if let Some(paths) = paths.filter(both_sound) {
-        return Ok(read_off(problem, settings, &scaled, &paths));
-    }
+    // What was followed of a path is not checked at all points.
     let unknown = Constants {
         linear: None,
         jnd: None,
@@ -221,7 +219,7 @@ fn read_off(
         top: scaled.top(),
         doubt: paths.limited.doubt.max(paths.unlimited.doubt),
     };
-    let expected = scaled.height_m() > 0.0 && paths.complete;
+    let expected = scaled.height_m() > 0.0;
     let linear = if expected { comparison.linear() } else { None };
     let jnd = match linear {
         None => None,
@@ -239,7 +237,6 @@ fn read_off(
     };
     WorstSolution {
         path,
-        complete: paths.complete,
         ..without_path(scaled, &constants)
     }
 }
