@@ -635,7 +635,9 @@ typedef struct {
 static int find_stencil(const double *nodes, size_t n, double position, stencil *s)
 {
     size_t low = 0, high = n;
-    if (!(nodes[0] <= position && position <= nodes[n - 1]))
+    const double first = n < 2 ? 0 : FLUXFORM_AT_NODE * (nodes[1] - nodes[0]);
+    const double last = n < 2 ? 0 : FLUXFORM_AT_NODE * (nodes[n - 1] - nodes[n - 2]);
+    if (!(nodes[0] - first <= position && position <= nodes[n - 1] + last))
         return 0;
     while (low < high) { /* the number of nodes <= position */
         size_t middle = low + (high - low) / 2;

@@ -21,6 +21,10 @@
 
 #include <stddef.h>
 
+/* Share of a cell's width from a node within which a position is at the node: computed otherwise the
+ * same coordinate has other last bits. */
+#define FLUXFORM_AT_NODE 1e-9
+
 #ifdef __cplusplus
 extern "C" {
 #endif

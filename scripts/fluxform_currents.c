@@ -7,10 +7,6 @@
 
 /* ---- the surface's height --------------------------------------------------------------------- */
 
-/* Share of a cell's width from a node within which a position is at the node: computed otherwise the
- * same coordinate has other last bits. */
-#define AT_NODE 1e-9
-
 /* The cell that holds a position, and the position's share of its width. */
 static int find_between(const double *nodes, size_t n, double position, size_t *at, double *share)
 {
@@ -29,7 +25,7 @@ static int find_between(const double *nodes, size_t n, double position, size_t *
     *at = low < 1 ? 0 : low - 1 < n - 2 ? low - 1 : n - 2;
     *share = (position - nodes[*at]) / (nodes[*at + 1] - nodes[*at]);
     for (int node = 0; node < 2; node++)
-        if (fabs(*share - node) <= AT_NODE) {
+        if (fabs(*share - node) <= FLUXFORM_AT_NODE) {
             *at += node;
             *share = 0;
             return 1;

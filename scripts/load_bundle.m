@@ -134,7 +134,12 @@ function [index, weight] = stencil(nodes, position)
 % The nodes of an axis that take part at a position, and their weights; none outside.
     index = [];
     weight = [];
-    if ~(nodes(1) <= position && position <= nodes(end))
+    % Computed otherwise the same coordinate has other last bits: a billionth of a cell beyond an end is at it.
+    slack = [0, 0];
+    if numel(nodes) > 1
+        slack = 1e-9 * [nodes(2) - nodes(1), nodes(end) - nodes(end - 1)];
+    end
+    if ~(nodes(1) - slack(1) <= position && position <= nodes(end) + slack(2))
         return
     end
     count = min(4, numel(nodes));

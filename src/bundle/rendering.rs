@@ -19,6 +19,7 @@ use super::array_check::{Array, NpzError, bad, check_nodes};
 use super::manifest::PointsGrid;
 use super::table::PointRow;
 use fluxform_lambda::uncertainty::RobustRuntime;
+use fluxform_numerics::lagrange::AT_NODE;
 
 pub(super) const HEIGHT_X: &str = "height_x_m";
 pub(super) const HEIGHT_Y: &str = "height_y_m";
@@ -280,10 +281,6 @@ impl SurfaceCell {
         (1.0 - t) * low + t * high
     }
 }
-
-/// Share of a cell's width from a node within which a position is at the node: computed otherwise the same
-/// coordinate has other last bits.
-const AT_NODE: f64 = 1e-9;
 
 /// The cell that holds a position, and the position's share of its width, 0 at a node; `None` outside.
 fn between(nodes: &[f64], position: f64) -> Option<(usize, f64)> {

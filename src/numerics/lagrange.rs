@@ -1,7 +1,7 @@
 //! Tensor-product cubic Lagrange interpolation on a rectilinear grid ("tricubic-lagrange").
 //!
 //! Along each axis the polynomial runs through the four nodes nearest to the position: two on
-//! either side, moved inward at the borders so that it never extrapolates. An axis of two or three
+//! either side, moved inward at the borders so that it extrapolates by roundings alone. An axis of two or three
 //! nodes uses them all (linear, quadratic); an axis of one node has a value on that node alone.
 //! At a node the node's value comes back exactly. For a function with bounded fourth derivatives
 //! the error is at most `(h^4 / 43) max|f''''|` an axis inside and `h^4 / 24` in the border cells
@@ -22,12 +22,28 @@ pub struct Stencil {
     pub weights: [f64; ORDER_NODES],
 }
 
-/// The stencil at `position` on strictly increasing `nodes`; `None` outside their range, for a NaN
-/// and for no nodes.
+/// Share of a cell's width from a node within which a position is at the node: computed otherwise the same
+/// coordinate has other last bits.
+pub const AT_NODE: f64 = 1e-9;
+
+/// Whether a position is within the range of strictly increasing `nodes`, or beyond an end by its last bits.
+#[must_use]
+pub fn holds(nodes: &[f64], position: f64) -> bool {
+    match nodes {
+        [] => false,
+        [only] => position == *only,
+        [first, second, ..] => {
+            let [before, last] = [nodes[nodes.len() - 2], nodes[nodes.len() - 1]];
+            (first - AT_NODE * (second - first)..=last + AT_NODE * (last - before))
+                .contains(&position)
+        }
+    }
+}
+
+/// The stencil at `position` on strictly increasing `nodes`; `None` where they do not hold it ([`holds`]).
 #[must_use]
 pub fn stencil(nodes: &[f64], position: f64) -> Option<Stencil> {
-    let (&first, &last) = (nodes.first()?, nodes.last()?);
-    if !(first <= position && position <= last) {
+    if !holds(nodes, position) {
         return None;
     }
     let count = nodes.len().min(ORDER_NODES);

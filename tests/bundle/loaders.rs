@@ -62,6 +62,10 @@ fn positions(map: &MapArrays) -> Vec<[f64; 3]> {
                         }
                     }
                     (2, _) => from + (to - from) * (1.2 * t - 0.1),
+                    // At an end but for the last bits.
+                    (3, _) => {
+                        (if t < 0.5 { from } else { to }) + 1e-12 * (to - from) * (40.0 * t).sin()
+                    }
                     _ => from + (to - from) * t,
                 }
             })

@@ -86,6 +86,26 @@ fn an_object_within_the_workspace_whose_forces_are_too_weak_is_not_moved() {
     assert!(!refused.err.contains("--translate"), "{}", refused.err);
 }
 
+/// Broke: what touches an end of the workspace lay outside where a sum of lengths was rounded upward.
+#[test]
+fn regression_an_object_that_touches_the_workspace_s_top_lay_outside() {
+    let place = Place::new();
+    // 16 mm + 20 mm is 36.000000000000004 mm.
+    place
+        .run(&["init", "desk", "--object", "half-sphere", "--name", "d"])
+        .ends(0);
+    let args = ["calibrate", "d.toml", "d_half-sphere.toml", "--no-report"];
+    let ran = place.run(&args).ends(0);
+    assert!(!ran.err.contains("outside"), "{}", ran.err);
+    place.write("top.csv", "t_s,x_m,y_m,z_m\n0,0,0,0.036000000000000004\n");
+    let bundle = place.path("results/d/half-sphere");
+    let bundle = bundle.to_str().unwrap();
+    let ran = place
+        .run(&["replay", bundle, "top.csv", "--out", "-"])
+        .ends(0);
+    assert!(!ran.out.contains("outside"), "{}", ran.out);
+}
+
 #[test]
 fn a_few_points_outside_are_a_warning() {
     let place = Place::new();

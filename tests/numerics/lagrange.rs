@@ -44,6 +44,12 @@ fn the_stencil_is_the_nearest_four_and_stays_inside() {
         assert_eq!(stencil(&nodes, outside), None);
     }
     assert_eq!(stencil(&[], 0.0), None);
+    // Computed otherwise an end has other last bits.
+    for (end, node) in [(-1e-11, 0), (1.8 + 1e-11, 6)] {
+        let at = stencil(&nodes, end).unwrap();
+        let weight = at.weights[node - at.start];
+        assert!((weight - 1.0).abs() < 1e-9, "{end} {at:?}");
+    }
 }
 
 #[test]

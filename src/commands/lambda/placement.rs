@@ -3,6 +3,7 @@
 use super::{ForcePoints, LambdaReport};
 use crate::design::Design;
 use crate::numerics::axis::Axis;
+use crate::numerics::lagrange;
 use crate::shape::document::{ShapeDocument, SurfaceSource, parse_unit, unit_name, unit_names};
 use crate::units::DETECTION_THRESHOLD_N;
 
@@ -58,9 +59,8 @@ impl Placed<'_> {
 
     /// The points outside the design's workspace, where a runtime gives no force.
     fn outside(&self) -> Outside {
-        let axes = self.axes();
-        let inside =
-            |point: &[f64; 3]| (0..3).all(|k| axes[k].from <= point[k] && point[k] <= axes[k].to);
+        let nodes = self.axes().map(|axis| axis.nodes());
+        let inside = |point: &[f64; 3]| (0..3).all(|k| lagrange::holds(&nodes[k], point[k]));
         let all = self.points.positions_m.len();
         let outside = self
             .points

@@ -185,9 +185,8 @@ class Bundle:
     def inside(self, points_m):
         """True for each point (x, y, z in m) within the map's grid."""
         points_m = _rows(points_m)
-        axes = [self.map[key] for key in ("x_m", "y_m", "z_m")]
-        low = np.array([axis[0] for axis in axes])
-        high = np.array([axis[-1] for axis in axes])
+        ends = [_ends(self.map[key]) for key in ("x_m", "y_m", "z_m")]
+        low, high = np.transpose(ends)
         return np.all((low <= points_m) & (points_m <= high), axis=1)
 
     def gz_per_ampere(self, points_m):
@@ -508,6 +507,12 @@ def _stencil(nodes, positions):
 # Share of a cell's width from a node within which a position is at the node: computed otherwise the same
 # coordinate has other last bits.
 AT_NODE = 1e-9
+
+
+def _ends(nodes):
+    """The ends of an axis, beyond which a position is outside."""
+    first, last = (nodes[1] - nodes[0], nodes[-1] - nodes[-2]) if len(nodes) > 1 else (0, 0)
+    return nodes[0] - AT_NODE * first, nodes[-1] + AT_NODE * last
 
 
 def _between(nodes, positions):
