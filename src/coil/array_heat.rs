@@ -41,12 +41,9 @@ impl Drivers {
     /// sum R I_i^2 over l_i <= I_i <= u_i, sum I_i <= I_t, where |l_i|, u_i <= V/R at a supply of `voltage_v`.
     ///
     /// Heat is convex, so all currents but one are at an end. A coil that is no hotter at u_i than at l_i stays at
-    /// l_i, which leaves the others most of the sum. The others go from l_i to u_i in the order of what that adds
-    /// to the heat for each ampere of the sum, R (u_i + l_i); the first that finds no room for it takes the rest.
-    ///
-    /// Exact where those others have one l_i, as alike coils and one-way drivers do: their I_i - l_i majorise all
-    /// others of the same sum (Marshall and Olkin 1979, chapter 3). With several l_i it is a knapsack problem, of
-    /// which the linear relaxation is returned: an upper bound, by less than the heat of one coil at u_i.
+    /// l_i, which leaves the others most of the sum. Which of the others go to u_i, and which one in between, is a
+    /// knapsack problem, solved by branch and bound over kinds of coils with the same ends; beyond [`MOST_NODES`] of
+    /// its tree its linear relaxation is returned: an upper bound, by less than the heat of one coil at u_i.
     #[must_use]
     pub fn most_heat_w(&self, voltage_v: Option<f64>, resistance_ohm: f64) -> [f64; 2] {
         let resistance = [resistance_ohm, 1.0];
@@ -70,27 +67,155 @@ impl Drivers {
                 hotter.push([low, high]);
             }
         }
-        let per_ampere = |[low, high]: &[Dual; 2]| low[0] + high[0];
-        hotter.sort_by(|a, b| per_ampere(b).total_cmp(&per_ampere(a)));
-        let exact = hotter.windows(2).all(|two| two[0][0][0] == two[1][0][0]);
-        for [low, high] in hotter {
-            let range = difference(high, low);
-            let fits = range[0] <= left[0];
-            let added = if fits { range } else { left };
-            let to = if fits || !exact {
-                high
-            } else {
-                sum(low, added)
-            };
-            let gain = product(product(resistance, added), sum(low, to));
-            if gain[0] > 0.0 {
-                most = sum(most, gain);
-            }
-            if !fits {
-                break;
-            }
-            left = difference(left, range);
+        let search = Search::new(hotter, left[0]);
+        for (kind, coils) in search.kinds.iter().zip(&search.best.raised) {
+            let coils = [*coils as f64, 0.0];
+            left = difference(left, product(coils, difference(kind.high, kind.low)));
+            most = sum(
+                most,
+                product(coils, difference(heat(kind.high), heat(kind.low))),
+            );
+        }
+        if let Some(kind) = search.best.between.map(|kind| &search.kinds[kind]) {
+            let range = difference(kind.high, kind.low);
+            let current = sum(kind.low, if range[0] <= left[0] { range } else { left });
+            most = sum(most, difference(heat(current), heat(kind.low)));
+        }
+        if let Some(missed_a2) = search.missed_a2 {
+            most[0] += resistance_ohm * missed_a2;
         }
         most
+    }
+}
+
+/// Nodes of the search's tree at most.
+const MOST_NODES: usize = 200_000;
+/// A bound above what is known by no more than this share promises nothing.
+const ROUNDING: f64 = 1e-13;
+
+/// Coils with the same ends, hotter at the upper one.
+struct Kind {
+    low: Dual,
+    high: Dual,
+    coils: usize,
+}
+
+impl Kind {
+    fn range_a(&self) -> f64 {
+        self.high[0] - self.low[0]
+    }
+
+    /// What a current raised from the lower end adds to its square, A^2.
+    fn gain_a2(&self, raised_a: f64) -> f64 {
+        raised_a * (2.0 * self.low[0] + raised_a)
+    }
+}
+
+/// How many coils of each kind are at their upper end, and of which kind one is in between.
+#[derive(Clone)]
+struct Choice {
+    raised: Vec<usize>,
+    between: Option<usize>,
+    gain_a2: f64,
+}
+
+struct Search {
+    /// The hottest for each ampere of the sum first.
+    kinds: Vec<Kind>,
+    best: Choice,
+    nodes: usize,
+    /// What the relaxation has more than the best, A^2, where the search was given up.
+    missed_a2: Option<f64>,
+}
+
+impl Search {
+    fn new(mut hotter: Vec<[Dual; 2]>, left_a: f64) -> Self {
+        let order = |[low, high]: &[Dual; 2]| (low[0] + high[0], low[0]);
+        hotter.sort_by(|a, b| {
+            let (a, b) = (order(a), order(b));
+            b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
+        let alike = hotter.chunk_by(|a, b| a == b);
+        let kinds: Vec<Kind> = alike
+            .map(|coils| Kind {
+                low: coils[0][0],
+                high: coils[0][1],
+                coils: coils.len(),
+            })
+            .collect();
+        let none = Choice {
+            raised: vec![0; kinds.len()],
+            between: None,
+            gain_a2: 0.0,
+        };
+        let mut search = Self {
+            best: none.clone(),
+            kinds,
+            nodes: 0,
+            missed_a2: None,
+        };
+        for between in std::iter::once(None).chain((0..search.kinds.len()).map(Some)) {
+            let mut choice = Choice {
+                between,
+                ..none.clone()
+            };
+            search.go_on(0, left_a, &mut choice);
+        }
+        if search.nodes > MOST_NODES {
+            let relaxed_a2 = search.bound_a2(0, left_a, &none);
+            search.missed_a2 = Some((relaxed_a2 - search.best.gain_a2).max(0.0));
+        }
+        search
+    }
+
+    /// Coils of a kind that may be at their upper end.
+    fn free(&self, kind: usize, choice: &Choice) -> usize {
+        self.kinds[kind].coils - usize::from(choice.between == Some(kind))
+    }
+
+    /// No choice that goes on from `kind` gains more, A^2: the relaxation, in which any part of a coil may be raised at
+    /// the coil's own rate.
+    fn bound_a2(&self, kind: usize, mut left_a: f64, choice: &Choice) -> f64 {
+        let mut bound_a2 = choice.gain_a2;
+        let mut fill = |kind: &Kind, coils: usize| {
+            let raised_a = (coils as f64 * kind.range_a()).min(left_a);
+            bound_a2 += raised_a * (kind.low[0] + kind.high[0]);
+            left_a -= raised_a;
+        };
+        if let Some(between) = choice.between.filter(|between| *between < kind) {
+            fill(&self.kinds[between], 1);
+        }
+        for kind in &self.kinds[kind..] {
+            fill(kind, kind.coils);
+        }
+        bound_a2
+    }
+
+    /// Tries all numbers of coils of `kind` and the following ones at their upper ends.
+    fn go_on(&mut self, kind: usize, left_a: f64, choice: &mut Choice) {
+        self.nodes += 1;
+        let known_a2 = self.best.gain_a2 * (1.0 + ROUNDING);
+        if self.nodes > MOST_NODES || self.bound_a2(kind, left_a, choice) <= known_a2 {
+            return;
+        }
+        let gain_a2 = choice.gain_a2;
+        if kind == self.kinds.len() {
+            if let Some(between) = choice.between.map(|between| &self.kinds[between]) {
+                choice.gain_a2 += between.gain_a2(left_a.min(between.range_a()));
+            }
+            if choice.gain_a2 > self.best.gain_a2 {
+                self.best = choice.clone();
+            }
+        } else {
+            let range_a = self.kinds[kind].range_a();
+            let fit = (left_a / range_a) as usize;
+            for raised in (0..=fit.min(self.free(kind, choice))).rev() {
+                choice.raised[kind] = raised;
+                choice.gain_a2 = gain_a2 + raised as f64 * self.kinds[kind].gain_a2(range_a);
+                self.go_on(kind + 1, left_a - raised as f64 * range_a, choice);
+            }
+            choice.raised[kind] = 0;
+        }
+        choice.gain_a2 = gain_a2;
     }
 }
