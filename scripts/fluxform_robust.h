@@ -190,6 +190,9 @@ static void choose_for_uncertainties(fluxform_bundle *b, const double *position,
 {
     size_t n = b->coil_count, places = b->robust_setting[1] == 0 ? 1 : RULE_PLACES;
     int vector = b->requested_direction != NULL;
+    /* The pull goes with the square of the strength, which is even between its least and 1: mean of the cube over
+     * the mean. */
+    double least = 2 * b->robust_setting[3] - 1, warm = 0.5 * (1 + least * least);
     double *force = b->robust_scratch, *within, wanted[3], place[3];
     expected_error p;
     wanted[0] = s->wanted_x_n, wanted[1] = s->wanted_y_n, wanted[2] = s->wanted_n;
@@ -213,6 +216,7 @@ static void choose_for_uncertainties(fluxform_bundle *b, const double *position,
             weight = rule_place(b, position, k, place);
         if (b->passive_force_n)
             fluxform_passive_force(b, place[0], place[1], place[2], &pull);
+        pull *= warm;
         if (!vector) {
             fluxform_force_per_ampere(b, place[0], place[1], place[2], force);
             add_component(&p, b->robust_setting, force, 1, wanted[2] - pull, weight);

@@ -273,7 +273,9 @@ function [currents, force, answers] = robust_feedback(map, points_m)
     for p = find(~strcmp(answers, 'outside')).'
         places = points_m(p, 1:3) + setting(2) * rule;
         places = min(max(places, repmat(low, size(places, 1), 1)), repmat(high, size(places, 1), 1));
-        pull = passive_force(map, places);
+        % The pull goes with the square of the strength, which is even between its least and 1: mean of the cube
+        % over the mean.
+        pull = passive_force(map, places) * (1 + (2 * setting(4) - 1) ^ 2) / 2;
         form.lower = map.current_min_a.';
         form.upper = map.current_max_a.';
         form.linear = zeros(numel(form.upper), 1);

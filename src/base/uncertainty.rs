@@ -123,8 +123,52 @@ pub struct Moments {
     pub along_square: f64,
     /// Mean square of the share along either axis across; its mean is 0.
     pub across_square: f64,
+    /// What the pull of unpowered steel has in these means.
+    pub pull: PullMoments,
     /// Mean square of a driver's relative error.
     pub driver_square: f64,
+}
+
+/// Means of the steel's pull over that on the magnet as stated, its cube and fourth power of the strength among them:
+/// the pull goes with the square of the moment ([`relative_pull`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PullMoments {
+    /// Mean.
+    pub mean: f64,
+    /// Mean of its square.
+    pub square: f64,
+    /// Mean of it times the magnet's strength and the share along its own axis.
+    pub times_moment: f64,
+}
+
+impl PullMoments {
+    /// For a strength evenly between `weakest` and 1, and these means of the tilt's cosine and its powers up to the
+    /// fourth.
+    #[must_use]
+    pub fn new(weakest: f64, [one, two, three, four]: [f64; 4]) -> Self {
+        let power = |n: i32| (0..=n).map(|k| weakest.powi(k)).sum::<f64>() / f64::from(n + 1);
+        Self {
+            mean: power(2) * 0.5 * (1.0 + two),
+            square: power(4) * 0.25 * (1.0 + 2.0 * two + four),
+            times_moment: power(3) * 0.5 * (one + three),
+        }
+    }
+}
+
+/// The steel's pull on a moment along the magnet's own axis and both across, over that on a moment 1 along it: that of
+/// the moment's image in a half space of steel.
+#[must_use]
+pub fn relative_pull([along, across, other]: [f64; 3]) -> f64 {
+    along * along + 0.5 * (across * across + other * other)
+}
+
+/// 1 less the mean cosine of an angle even over a disc of this radius: int_0^x (2 t / x^2) (1 - cos t) dt.
+fn less_than_cosine(x: f64) -> f64 {
+    let square = x * x;
+    if x < 0.03 {
+        return square * (0.25 - square * (1.0 / 72.0 - square / 2880.0));
+    }
+    1.0 - 2.0 * (x * x.sin() - 2.0 * (0.5 * x).sin().powi(2)) / square
 }
 
 impl Uncertainty {
@@ -184,23 +228,20 @@ impl Uncertainty {
     pub fn moments(&self) -> Moments {
         let weakest = self.strength(1.0);
         let tilt = self.tilt_deg.to_radians();
-        let (along, along_square) = if tilt > 0.0 {
-            let square = tilt * tilt;
-            let half = (0.5 * tilt).sin();
-            // Integrals of 2 t cos(t) and 2 t cos(t)^2 over 0 to the tilt, over its square.
-            let mean = 2.0 * (tilt * tilt.sin() - 2.0 * half * half) / square;
-            let of_square =
-                0.5 + (0.5 * tilt * (2.0 * tilt).sin() - 0.5 * tilt.sin().powi(2)) / square;
-            (mean, of_square)
-        } else {
-            (1.0, 1.0)
-        };
+        let [one, two, three, four] = [1.0, 2.0, 3.0, 4.0].map(|k| less_than_cosine(k * tilt));
+        let (along, along_square) = (1.0 - one, 1.0 - 0.5 * two);
+        // cos^3 = (3 cos t + cos 3 t) / 4, cos^4 = (3 + 4 cos 2 t + cos 4 t) / 8.
+        let (cube, fourth) = (
+            1.0 - 0.25 * (3.0 * one + three),
+            1.0 - 0.125 * (4.0 * two + four),
+        );
         Moments {
             gain: 0.5 * (1.0 + weakest),
             gain_square: (1.0 + weakest + weakest * weakest) / 3.0,
             along,
             along_square,
-            across_square: 0.5 * (1.0 - along_square).max(0.0),
+            across_square: 0.25 * two,
+            pull: PullMoments::new(weakest, [along, along_square, cube, fourth]),
             driver_square: self.driver * self.driver / 3.0,
         }
     }
@@ -225,6 +266,20 @@ mod tests {
         // Even over a disc: the square of the radius is even.
         let tilt = |u: f64| (given.tilt_deg.to_radians() * u.sqrt()).cos();
         let moments = given.moments();
+        // Strength and tilt are independent.
+        let both = |of: &dyn Fn(f64, f64) -> f64| {
+            let (coarse, steps) = (|k: i32| (f64::from(k) + 0.5) / 1500.0, 0..1500);
+            let of_strength = |strength: f64| {
+                let of_tilt = |k: i32| {
+                    let cos = strength * tilt(coarse(k));
+                    let sin = (strength * strength - cos * cos).sqrt();
+                    of(cos, relative_pull([cos, 0.6 * sin, 0.8 * sin]))
+                };
+                steps.clone().map(of_tilt).sum::<f64>() / 1500.0
+            };
+            let strengths = steps.clone().map(|k| given.strength(coarse(k)));
+            strengths.map(of_strength).sum::<f64>() / 1500.0
+        };
         for (found, expected) in [
             (moments.gain, mean(&|u| given.strength(u))),
             (moments.gain_square, mean(&|u| given.strength(u).powi(2))),
@@ -238,19 +293,39 @@ mod tests {
                 moments.driver_square,
                 mean(&|u| (given.driver * (2.0 * u - 1.0)).powi(2)),
             ),
+            (moments.pull.mean, both(&|_, pull| pull)),
+            (moments.pull.square, both(&|_, pull| pull * pull)),
+            (
+                moments.pull.times_moment,
+                both(&|moment, pull| moment * pull),
+            ),
         ] {
-            assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+            assert!((found - expected).abs() < 3e-8, "{found} {expected}");
         }
-        let exact = Uncertainty::default().moments();
+        let exact_but_for_tilt = Uncertainty::default();
+        let exact = exact_but_for_tilt.moments();
         assert_eq!(
             [exact.gain, exact.along_square, exact.across_square],
             [1.0, 1.0, 0.0]
         );
-        let tiny = Uncertainty {
-            tilt_deg: 1e-6,
-            ..given
+        for tilt_deg in [1e-300, 1e-160, 1e-6, 0.0859, 0.086] {
+            let small = Uncertainty {
+                tilt_deg,
+                ..exact_but_for_tilt
+            };
+            let (moments, square) = (small.moments(), tilt_deg.to_radians().powi(2));
+            for (found, deficit) in [
+                (moments.along, 0.25),
+                (moments.along_square, 0.5),
+                (moments.pull.mean, 0.25),
+                (moments.pull.times_moment, 0.5),
+            ] {
+                assert!(
+                    (found - 1.0 + deficit * square).abs() < 1e-12,
+                    "{tilt_deg} {found}"
+                );
+            }
+            assert!((moments.across_square - 0.25 * square).abs() <= 1e-6 * square);
         }
-        .moments();
-        assert!((tiny.along_square - 1.0).abs() < 1e-12);
     }
 }

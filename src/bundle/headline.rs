@@ -217,6 +217,8 @@ pub struct FeltForce {
 
 /// What is left out where the unpowered steel's upward pull counts.
 pub const SIDEWAYS_PULL: &str = "sideways pull of the unpowered steel";
+/// What is left out where that pull counts and the magnet may tilt.
+const TILTED_PULL: &str = "the pull's change with the finger's tilt beside an edge of the steel: it is taken as above a half space";
 /// Effects that no part of the felt error covers.
 const NOT_MODELLED: [&str; 6] = [
     "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",
@@ -266,6 +268,8 @@ impl FeltForce {
                 "{SIDEWAYS_PULL}: about {percent:.1} % of the requested force, root mean square"
             )
         });
+        let of_tilt = (pull.is_some() && causes.iter().any(|of| of.cause == Cause::Tilt))
+            .then(|| TILTED_PULL.to_owned());
         let expected = study.map_or(exact, promised);
         Self {
             total: expected,
@@ -275,7 +279,7 @@ impl FeltForce {
                 None => Some(sampling),
             },
             parts: std::iter::once(own).chain(parts).collect(),
-            not_modelled: (pull.into_iter().chain(not_given))
+            not_modelled: (pull.into_iter().chain(of_tilt).chain(not_given))
                 .chain(NOT_MODELLED.map(str::to_owned))
                 .collect(),
         }

@@ -21,7 +21,7 @@ use fluxform_numerics::vec3::dot;
 
 use super::feedback::FeedbackError;
 use super::problem::{ForceProblem, Settings};
-use super::uncertainty::ErrorForm;
+use super::uncertainty::{ErrorForm, Target};
 use super::vector_feedback::VectorProblem;
 
 /// Pairs looked at, at most.
@@ -161,7 +161,7 @@ pub fn allocate(limits: &ForceProblem, rows: &[(&[f64], f64, f64)], currents_a: 
     for &(row, requested_n, share) in rows {
         strongest = row.iter().fold(strongest, |most, g| most.max(g.abs()));
         form.add_square(row, share * share, 0.0);
-        form.add_target(row, requested_n, 1.0, share * share);
+        form.add_target(row, Target::exact(requested_n), share * share);
     }
     let ohm = limits.resistance_ohm.iter().copied();
     let least_ohm = ohm.fold(f64::INFINITY, f64::min);

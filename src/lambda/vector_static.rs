@@ -23,7 +23,7 @@ use fluxform_base::force_constant::ForceConstants;
 use super::feedback::FeedbackError;
 use super::problem::{ForceProblem, Settings};
 use super::solve::{OperatingPoint, solve};
-use super::uncertainty::ErrorForm;
+use super::uncertainty::{ErrorForm, Target};
 use super::vector_feedback::{CurrentsOf, VectorProblem, VectorRendering, render_vectors};
 
 /// A gap between the ends of the least longest error below this share is none.
@@ -282,7 +282,8 @@ impl<'a> Vectors<'a> {
             let weight = weights[row % self.points];
             if weight > 0.0 {
                 form.add_square(self.force_n_per_a(row), weight, 0.0);
-                form.add_target(self.force_n_per_a(row), self.requested_n(row), 1.0, weight);
+                let target = Target::exact(self.requested_n(row));
+                form.add_target(self.force_n_per_a(row), target, weight);
             }
         }
         form.minimise(self.rows, self.price, currents_a);

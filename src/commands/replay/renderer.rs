@@ -378,7 +378,7 @@ impl Renderer {
                     0.0
                 };
                 part.form
-                    .add(&part.row_n_per_a, target[axis] - pull_n, weight);
+                    .add(&part.row_n_per_a, (target[axis], pull_n), weight);
             }
         }
         part.form.minimise(&part.limits.problem(), currents);

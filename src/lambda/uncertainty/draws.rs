@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use fluxform_base::uncertainty::Uncertainty;
+use fluxform_base::uncertainty::{Uncertainty, relative_pull};
 use fluxform_numerics::random::Random;
 
 use super::Turned;
@@ -51,10 +51,10 @@ pub fn draws(given: &Uncertainty, points: usize, coils: usize, count: usize) -> 
 
 impl Draw {
     /// The force of commanded currents, N, where `field` is the force per ampere at the displaced place and
-    /// `pull_n` that without currents.
+    /// `pull_n` that without currents on the magnet as stated.
     #[must_use]
     pub fn force_n(&self, field: &[Turned], pull_n: f64, currents_a: &[f64]) -> [f64; 3] {
-        let mut force = [0.0, 0.0, pull_n];
+        let mut force = [0.0, 0.0, pull_n * relative_pull(self.moment)];
         for ((turned, current), gain) in field.iter().zip(currents_a).zip(&self.gain) {
             for (axis, sum) in force.iter_mut().enumerate() {
                 let of_moment = self.moment.iter().enumerate();

@@ -7,6 +7,8 @@
 //! Strictly convex for a price above zero. Over the box the primal active-set method ends on the exact
 //! solution; the multiplier of the sum, where it binds, is the root of a sum that falls with it.
 
+use fluxform_base::uncertainty::PullMoments;
+
 use crate::problem::ForceProblem;
 
 /// Rounds of the search for the multiplier of the sum.
@@ -15,6 +17,39 @@ const ROUNDS: usize = 80;
 const SUM_MET: f64 = 1e-12;
 /// Pulls below this share of the terms they are sums of are rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// What currents are to give: the request less the steel's pull, which goes with the square of the moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target {
+    /// Mean of it times the magnet's strength and the share of the moment along its own axis, N.
+    mean_n: f64,
+    /// Mean of its square, N^2.
+    square_n2: f64,
+}
+
+impl Target {
+    /// Of a moment and a force that are certain.
+    pub(crate) fn exact(wanted_n: f64) -> Self {
+        Self {
+            mean_n: wanted_n,
+            square_n2: wanted_n * wanted_n,
+        }
+    }
+
+    /// Where the strength's mean is `gain`, the share's `along`, and the magnet as stated is pulled by `pull_n`.
+    pub(crate) fn new(
+        request_n: f64,
+        pull_n: f64,
+        (gain, along): (f64, f64),
+        pull: PullMoments,
+    ) -> Self {
+        Self {
+            mean_n: request_n * gain * along - pull_n * pull.times_moment,
+            square_n2: request_n * (request_n - 2.0 * pull_n * pull.mean)
+                + pull_n * pull_n * pull.square,
+        }
+    }
+}
 
 /// A mean square error, N^2.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,12 +91,13 @@ impl ErrorForm {
         }
     }
 
-    /// Adds `weight` times the cross term of `row . I` and the force `wanted_n`, and that force's square.
-    pub(crate) fn add_target(&mut self, row: &[f64], wanted_n: f64, mean: f64, weight: f64) {
+    /// Adds `weight` times the cross term of `row . I` and a force, given its mean with what scales the row, and that
+    /// force's mean square.
+    pub(crate) fn add_target(&mut self, row: &[f64], of: Target, weight: f64) {
         for (sum, a) in self.linear.iter_mut().zip(row) {
-            *sum += weight * mean * wanted_n * a;
+            *sum += weight * of.mean_n * a;
         }
-        self.constant += weight * wanted_n * wanted_n;
+        self.constant += weight * of.square_n2;
     }
 
     /// Adds `share` times another.

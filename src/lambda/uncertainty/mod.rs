@@ -13,6 +13,9 @@
 //! square `d^2` of a driver's error: a quadratic, whose minimum over the limits is exact
 //! (`error_form`). The rule is that of Hammer and Stroud (1958) of degree 5, 14 places within the box.
 //!
+//! Unpowered steel pulls a warmer and tilted magnet by `s^2 p P`, the magnet as stated by `P`, with `p` as above a
+//! half space of steel. `F - s^2 p P` takes the place of `F` then, in `b` and `c` under the means.
+//!
 //! The request is that of the measured place: a sensor that is off by a constant moves the object, which no
 //! finger feels as a wrong force. Static currents know no sensor; for them the same displacement is that of
 //! the magnet from the place of the surface that it renders.
@@ -25,6 +28,7 @@ mod study;
 
 pub use draws::{Draw, draws};
 pub use error_form::ErrorForm;
+pub(crate) use error_form::Target;
 pub use felt_error::{CauseCost, CurrentsError, FeltError, RobustSetting, Shares, Study, TradeOff};
 pub use runtime::{RobustForm, RobustRuntime};
 pub use study::{Drawn, Surroundings, study};
@@ -154,7 +158,9 @@ impl Forms {
                 } else {
                     &mut forms.sideways
                 };
-                let wanted_n = request_n[axis] - if axis == 2 { pull_n } else { 0.0 };
+                let pull_n = if axis == 2 { pull_n } else { 0.0 };
+                let scale = (moments.gain, moments.along);
+                let target = Target::new(request_n[axis], pull_n, scale, moments.pull);
                 let shares = [
                     moments.along_square,
                     moments.across_square,
@@ -171,7 +177,7 @@ impl Forms {
                     let square = weight * moments.gain_square * share;
                     form.add_square(&row, square, moments.driver_square);
                     if turn == 0 {
-                        form.add_target(&row, wanted_n, moments.gain * moments.along, weight);
+                        form.add_target(&row, target, weight);
                     }
                 }
             }

@@ -1,8 +1,8 @@
 //! Currents of the least expected error at a measured position, from what a bundle holds.
 
-use fluxform_base::uncertainty::Uncertainty;
+use fluxform_base::uncertainty::{PullMoments, Uncertainty};
 
-use super::{ErrorForm, ON_AXES, ON_DIAGONALS, displaced};
+use super::{ErrorForm, ON_AXES, ON_DIAGONALS, Target, displaced};
 use crate::problem::ForceProblem;
 
 /// The uncertainties as a runtime needs them. A bundle holds no force on a tilted magnet, so the tilt
@@ -84,9 +84,9 @@ impl RobustForm {
         self.form.clear();
     }
 
-    /// Adds one component of the force at a place of this weight: what the currents are to give, N, and the
-    /// force per ampere of every coil, N/A.
-    pub fn add(&mut self, row: &[f64], wanted_n: f64, weight: f64) {
+    /// Adds one component of the force at a place of this weight: what is requested and what the steel's pull on the
+    /// magnet as stated gives, N, and the force per ampere of every coil, N/A.
+    pub fn add(&mut self, row: &[f64], (request_n, pull_n): (f64, f64), weight: f64) {
         let RobustRuntime {
             square,
             mean,
@@ -94,7 +94,10 @@ impl RobustForm {
             ..
         } = self.setting;
         self.form.add_square(row, weight * square, driver_square);
-        self.form.add_target(row, wanted_n, mean, weight);
+        // The strength is even between its least and 1.
+        let pull = PullMoments::new(2.0 * mean - 1.0, [1.0; 4]);
+        let target = Target::new(request_n, pull_n, (mean, 1.0), pull);
+        self.form.add_target(row, target, weight);
     }
 
     /// The expected square of the error, N^2.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use fluxform_base::uncertainty::{Cause, Uncertainty};
+use fluxform_base::uncertainty::{Cause, Uncertainty, relative_pull};
 
 use super::felt_error::{
     CauseCost, CurrentsError, FeltError, RobustSetting, Shares, Study, TradeOff,
@@ -323,7 +323,8 @@ impl<'a> Bench<'a> {
                         .collect();
                     for strength in strengths {
                         let mut rest = request.map(|part| -part);
-                        rest[2] += self.around.pull_n(point, place);
+                        rest[2] += self.around.pull_n(point, place)
+                            * relative_pull(moment.map(|part| strength * part));
                         worst = worst.max(driven_wrong(&parts, strength, rest, given.driver));
                     }
                 }

@@ -333,11 +333,14 @@ class Bundle:
         nodes = [self.map[key] for key in ("x_m", "y_m", "z_m")]
         ends = np.array([[axis[0] for axis in nodes], [axis[-1] for axis in nodes]])
         total = float(self.map.get("total_current_max_a", np.inf))
+        # The pull goes with the square of the strength, which is even between its least and 1: mean of the cube
+        # over the mean.
+        warm = 0.5 * (1 + (2 * setting[3] - 1) ** 2)
         for k in np.flatnonzero(self.inside(points_m)):
             near, weights = places(points_m[k], setting[1], ends)
             rows = np.moveaxis(per_ampere(near).reshape(len(near), self.coil_count, -1), 1, 2)
             left = np.repeat(wanted[k : k + 1, 0 if vector else 2 :], len(near), axis=0)
-            left[:, -1] -= self.passive_force(near)
+            left[:, -1] -= warm * self.passive_force(near)
             form = ExpectedError(
                 rows, left, weights, setting, self.map["resistance_ohm"], self.map["current_min_a"],
                 self.map["current_max_a"],
