@@ -185,14 +185,15 @@ pub fn translation(text: &str) -> Result<Translation, String> {
     .map(Translation)
 }
 
-/// The noise of a sensor, greater than 0.
+/// The noise of a sensor, whose square and inverse square are numbers.
 pub fn noise(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        noise if noise > 0.0 => Ok(noise),
-        _ => Err(format!(
-            "invalid noise {text}: expected a number greater than 0, like 1e-6"
-        )),
+    let noise = number(text)?;
+    if (1e-30..=1e30).contains(&noise) {
+        return Ok(noise);
     }
+    Err(format!(
+        "invalid noise {text}: expected a number from 1e-30 to 1e30, like 1e-6"
+    ))
 }
 
 /// `S` or `X,Y,Z`, positive factors.
@@ -204,10 +205,10 @@ pub fn scale(text: &str) -> Result<Scale, String> {
         let [factor] = numbers(text, expected)?;
         [factor; 3]
     };
-    if factors.iter().all(|factor| *factor > 0.0) {
+    if factors.iter().all(|factor| (1e-12..=1e12).contains(factor)) {
         Ok(Scale(factors))
     } else {
-        Err("factors must be greater than 0".to_owned())
+        Err("factors must lie between 1e-12 and 1e12".to_owned())
     }
 }
 
@@ -218,8 +219,11 @@ pub fn rotation(text: &str) -> Result<Rotation, String> {
 
 /// `FROM,TO`, in millimetres or with units.
 pub fn ends(text: &str) -> Result<Ends, String> {
+    const FARTHEST_M: f64 = 1e3;
     let [from, to] = lengths(text, "FROM,TO in millimetres or with units, like -50,50")?;
-    if from <= to {
+    if from.abs().max(to.abs()) > FARTHEST_M {
+        Err(format!("is farther from the origin than {FARTHEST_M} m"))
+    } else if from <= to {
         Ok(Ends([from, to]))
     } else {
         Err(format!(

@@ -291,6 +291,13 @@ fn only_what_a_sidecar_lists_unchanged_is_replaced() {
         .run(&twice)
         .ends(4)
         .says(&["another file of this command"]);
+    let twice = [
+        "optimize", SEED, "--starts", "1", "--out", "z.html", "--report", "z.html",
+    ];
+    place
+        .run(&twice)
+        .ends(4)
+        .says(&["another file of this command"]);
     place.write("mine.svg", "<svg/>");
     let drawn = [&replay[..], &["--out", "-", "--plot", "mine.svg"]].concat();
     place.run(&drawn).ends(4).says(&["mine.svg"]);

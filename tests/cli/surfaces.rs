@@ -125,7 +125,13 @@ fn factors_that_differ_are_refused_unless_they_are_meant() {
     };
     let ran = raw(&["--scale", "1,1,1.3"]).ends(2);
     assert!(ran.err.contains("--stretch"), "{ran:?}");
-    raw(&["--scale", "0"]).ends(2);
+    for outlandish in [
+        ["--scale", "0"],
+        ["--scale", "1e-300"],
+        ["--x", "-1e300,1e300"],
+    ] {
+        raw(&outlandish).ends(2);
+    }
     raw(&["--scale", "1,2"]).ends(2);
     let highest = |flags: &[&str]| -> f64 {
         let ran = raw(flags).ends(0);

@@ -171,7 +171,7 @@ fn bad_trajectories_are_reported_with_their_line() {
         replay(&place, usage).ends(2);
     }
     replay(&place, "flat far.csv --out far.json")
-        .ends(3)
+        .ends(2)
         .says(&["take the ending .json"]);
 }
 

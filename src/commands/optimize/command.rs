@@ -130,14 +130,6 @@ impl Optimize {
             overwrite.check(path).map_err(RunError::from)?;
         }
         let drawn = [self.report.as_ref(), self.array.plot.as_ref()];
-        let [page, plot] = drawn.map(|file| {
-            let written = outputs.iter().map(|path| path.to_path_buf());
-            let protected = protected.iter().cloned().chain(written);
-            file.map(|file| Picture::new(file, self.writing.force, protected))
-        });
-        for picture in [&page, &plot].into_iter().flatten() {
-            picture.check(&inputs)?;
-        }
         let files = self.out.iter().chain(drawn.into_iter().flatten());
         if files.clone().filter(|file| file.is_standard()).count() > 1 {
             return Err(Failure::Usage(
@@ -146,6 +138,14 @@ impl Optimize {
             ));
         }
         check_distinct(files.map(FileArgument::as_given)).map_err(RunError::from)?;
+        let [page, plot] = drawn.map(|file| {
+            let written = outputs.iter().map(|path| path.to_path_buf());
+            let protected = protected.iter().cloned().chain(written);
+            file.map(|file| Picture::new(file, self.writing.force, protected))
+        });
+        for picture in [&page, &plot].into_iter().flatten() {
+            picture.check(&inputs)?;
+        }
         let bar = begin(printer);
         let source = Document {
             design: &document.design,

@@ -134,7 +134,7 @@ impl Replay {
         }
         let files = match &self.out {
             FileArgument::Standard => None,
-            FileArgument::Path(path) => Some(ReplayFiles::new(path)?),
+            FileArgument::Path(path) => Some(ReplayFiles::new(path).map_err(Failure::Usage)?),
         };
         let drawn = [self.plot.as_ref(), self.report.as_ref()];
         let streams = drawn.into_iter().flatten().chain([&self.out]);

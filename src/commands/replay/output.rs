@@ -29,7 +29,7 @@ impl ReplayFiles {
     ///
     /// # Errors
     /// An invalid name, or one that ends as the facts' file does.
-    pub fn new(path: &Path) -> Result<Self, RunError> {
+    pub fn new(path: &Path) -> Result<Self, String> {
         let name = path
             .file_name()
             .map(|name| name.to_string_lossy().into_owned());
@@ -37,18 +37,17 @@ impl ReplayFiles {
             .file_stem()
             .map(|stem| stem.to_string_lossy().into_owned());
         let (Some(table), Some(stem)) = (name, stem) else {
-            let message = format!(
+            return Err(format!(
                 "--out {}: name a file to write the table to",
                 path.display()
-            );
-            return Err(RunError::Input(message));
+            ));
         };
         let facts = format!("{stem}.json");
         if facts == table {
-            return Err(RunError::Input(format!(
+            return Err(format!(
                 "--out {}: the facts beside the table take the ending .json; name it otherwise",
                 path.display()
-            )));
+            ));
         }
         let folder = match path.parent() {
             Some(parent) if parent != Path::new("") => parent,
