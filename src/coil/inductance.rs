@@ -12,7 +12,7 @@
 //! (Duffy), and smoothed there by a power substitution.
 
 use fluxform_base::units::MU_0_T_M_PER_A;
-use fluxform_field::ring::mutual_over_mu_0;
+use fluxform_field::ring::Potentials;
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
 
@@ -32,14 +32,14 @@ pub fn self_inductance_h(winding: &Winding) -> f64 {
     let length = winding.length_m;
     let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
 
-    let along_s = |t: f64, u: f64| {
+    let mut loops = Potentials::default();
+    let mut along_s = |t: f64, u: f64| {
         let (lo, hi) = (a1 + 0.5 * t, a2 - 0.5 * t);
-        let mut sum = 0.0;
         gauss::graded(lo, hi, 0.5 * t.hypot(u), TOLERANCE, |s, weight| {
-            sum += weight * mutual_over_mu_0(s + 0.5 * t, s - 0.5 * t, t, u);
+            loops.add_mutual([s + 0.5 * t, s - 0.5 * t], [t, u], weight);
         });
         // Over the width as rounded against the radius, for thin sheets.
-        4.0 * (length - u) * sum * ((width - t) / (hi - lo))
+        4.0 * (length - u) * loops.sum() * ((width - t) / (hi - lo))
     };
     // Beyond u = 2 s the loops see each other as dipoles: the scale along the diagonal.
     let scale = 0.5 * (a1 + a2) / length.max(width);

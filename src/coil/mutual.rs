@@ -11,7 +11,7 @@
 use std::f64::consts::PI;
 
 use fluxform_base::units::MU_0_T_M_PER_A;
-use fluxform_field::ring::{RingPoint, ring_field};
+use fluxform_field::ring::{Potentials, RingPoint};
 use fluxform_field::winding::Winding;
 use fluxform_numerics::bounded_eigen::largest_eigenvalue;
 use fluxform_numerics::gauss;
@@ -99,8 +99,8 @@ fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
     let length = winding.length_m;
     let floor = nearest_share * a2;
     let (centre, half) = (0.5 * (a1 + a2), 0.5 * (a2 - a1));
-    let along_axis = |a: f64, rho: f64| {
-        let mut sum = 0.0;
+    let mut loops = Potentials::default();
+    let add_along_axis = |loops: &mut Potentials, a: f64, rho: f64, share: f64| {
         gauss::graded(0.0, length, (rho - a).max(floor), tolerance, |u, weight| {
             let at = RingPoint {
                 radius_m: a,
@@ -108,9 +108,8 @@ fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
                 offset_m: a - rho,
                 u_m: u,
             };
-            sum += weight * 2.0 * (length - u) * ring_field(at).a_phi_over_r;
+            loops.add(at, share * weight * 2.0 * (length - u));
         });
-        sum
     };
     // Either radius is singular where the other winding's nearest filament would be met.
     let nearest = (distance_m - a2).max(a2 + floor);
@@ -132,8 +131,9 @@ fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
             let projection = 2.0 * b * (b - distance_m * phi.cos());
             for (x, weight_a) in rule.nodes.iter().zip(&rule.weights) {
                 let weight = weight_b * weight_a * half * half * projection * PI / steps;
-                total += weight * along_axis(centre + half * x, rho);
+                add_along_axis(&mut loops, centre + half * x, rho, weight);
             }
+            total += loops.sum();
         }
     }
     let density = winding.current_density_per_m2();

@@ -194,7 +194,7 @@ mod tests {
     use super::*;
     use crate::inductance::self_inductance_h;
     use fluxform_base::units::MU_0_T_M_PER_A;
-    use fluxform_field::ring::mutual_over_mu_0;
+    use fluxform_field::ring::Potentials;
     use fluxform_field::winding::Winding;
 
     const SHAPES: [[f64; 3]; 10] = [
@@ -291,8 +291,9 @@ mod tests {
     fn sheets_side_by_side_are_loops_far_apart() {
         // Two short sheets of radii 1.3 and 0.2: length squared times the loops' inductance.
         let (value, _) = aligned(0.75, 1.1, 1e-4, &FINE);
-        let loops = mutual_over_mu_0(1.3, 0.2, 1.1, 0.0);
-        assert!((value / (2.0 * 1e-8 * loops) - 1.0).abs() < 1e-7);
+        let mut loops = Potentials::default();
+        loops.add_mutual([1.3, 0.2], [1.1, 0.0], 2.0 * 1e-8);
+        assert!((value / loops.sum() - 1.0).abs() < 1e-7);
     }
 
     #[test]

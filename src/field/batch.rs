@@ -173,13 +173,14 @@ impl Winding {
                     dispatch::run(chunk);
                 }
                 None => {
+                    let tolerance = ROUNDING_SHARE * tolerance;
                     for index in range {
                         let AxialField {
                             dbz_dz,
                             dbr_dz_over_r,
                             br_over_r,
                             ..
-                        } = self.field(r_m[index], z_m[index])?;
+                        } = self.field_to(r_m[index], z_m[index], tolerance)?;
                         out.dbz_dz[index] = dbz_dz;
                         if components != Components::Gz {
                             out.dbr_dz_over_r[index] = dbr_dz_over_r;
@@ -216,7 +217,7 @@ impl Winding {
             fluxform_base::progress::poll();
             let Some(rule) = self.batch_rule(Extent::of(r, z), tolerance) else {
                 for (r, z) in r.iter().zip(z) {
-                    out.push(self.field(*r, *z)?.b_z);
+                    out.push(self.field_to(*r, *z, ROUNDING_SHARE * tolerance)?.b_z);
                 }
                 continue;
             };

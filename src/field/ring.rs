@@ -6,6 +6,9 @@
 //! tau = sum 2^(n-1) gamma_n^2, every quantity below is free of cancellation on the axis:
 //! p^2 tau is the T of the classical form, whose division by r^2 is thus carried out on paper.
 
+use std::f64::consts::TAU;
+
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::dual::Number;
 
 /// Geometry of a loop and a field point. `offset` is a - r, passed beside both radii because
@@ -89,15 +92,93 @@ fn agm<T: Number>(s: T, d: T, p: f64) -> (T, T) {
     ((mean + geometric) * 0.5, tau)
 }
 
-/// Mutual inductance of two coaxial loops over mu_0, m: 2 pi r A_phi at the second loop.
-///
-/// Positive, without cancellation for any radii and distance. `offset` is a - b.
-#[must_use]
-pub fn mutual_over_mu_0(a_m: f64, b_m: f64, offset_m: f64, u_m: f64) -> f64 {
-    let p = 2.0 * a_m * b_m;
-    let d2 = offset_m * offset_m + u_m * u_m;
-    let (mean, tau) = agm((d2 + 2.0 * p).sqrt(), d2.sqrt(), p);
-    std::f64::consts::TAU * (a_m * b_m) * (a_m * b_m) * tau / mean
+/// Vector potentials of loops, to be summed with weights: eight at a time.
+#[derive(Debug, Default)]
+pub struct Potentials {
+    p_m2: Vec<f64>,
+    distance2_m2: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Potentials {
+    /// Adds A_phi / (r mu_0 I), 1/m, of a loop ([`RingField::a_phi_over_r`]).
+    pub fn add(&mut self, at: RingPoint<f64>, weight: f64) {
+        let a2 = at.radius_m * at.radius_m;
+        self.add_pair([at.radius_m, at.r_m], [at.offset_m, at.u_m], weight * a2);
+    }
+
+    /// Adds the mutual inductance of two coaxial loops over mu_0, m: 2 pi r A_phi at the second loop. Positive, without
+    /// cancellation for any radii and distance; `offset_m` is the difference of the radii.
+    pub fn add_mutual(&mut self, [a_m, b_m]: [f64; 2], [offset_m, u_m]: [f64; 2], weight: f64) {
+        let product = a_m * b_m;
+        let weight = weight * TAU * product * product;
+        self.add_pair([a_m, b_m], [offset_m, u_m], weight);
+    }
+
+    fn add_pair(&mut self, [a_m, b_m]: [f64; 2], [offset_m, u_m]: [f64; 2], weight: f64) {
+        self.p_m2.push(2.0 * a_m * b_m);
+        self.distance2_m2.push(offset_m * offset_m + u_m * u_m);
+        self.weights.push(weight);
+    }
+
+    /// The sum of what was added since the last one.
+    pub fn sum(&mut self) -> f64 {
+        let sum = dispatch::run(Sum(self));
+        self.p_m2.clear();
+        self.distance2_m2.clear();
+        self.weights.clear();
+        sum
+    }
+}
+
+struct Sum<'a>(&'a Potentials);
+
+impl Kernel for Sum<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> f64 {
+        let nodes = self
+            .0
+            .p_m2
+            .chunks(LANES)
+            .zip(self.0.distance2_m2.chunks(LANES));
+        let mut sum = 0.0;
+        for ((p, d2), weights) in nodes.zip(self.0.weights.chunks(LANES)) {
+            let (p, d2) = (Lanes::load(p), Lanes::load(d2));
+            let (mean, tau) = agm_of_lanes::<FMA>((p * 2.0 + d2).sqrt(), d2.sqrt(), p);
+            let terms = tau / mean;
+            sum += weights
+                .iter()
+                .zip(terms.0)
+                .map(|(weight, term)| weight * term)
+                .sum::<f64>();
+        }
+        sum
+    }
+}
+
+/// As [`agm`], until the last of the lanes has converged.
+#[inline(always)]
+fn agm_of_lanes<const FMA: bool>(s: Lanes, d: Lanes, p: Lanes) -> (Lanes, Lanes) {
+    let (mut mean, mut geometric) = ((s + d) * 0.5, (s * d).sqrt());
+    let mut gamma = Lanes::splat(0.5) / mean;
+    let mut tau = gamma * gamma;
+    let mut weight = 1.0;
+    let quarter_p = p * 0.25;
+    let goes_on = |gamma: Lanes, mean: Lanes| {
+        let left = p * gamma - mean * AGM_STOP;
+        left.0.iter().fold(0.0_f64, |most, left| most.max(*left)) > 0.0
+    };
+    while goes_on(gamma, mean) {
+        let next = (mean + geometric) * 0.5;
+        geometric = (mean * geometric).sqrt();
+        mean = next;
+        gamma = gamma * gamma * quarter_p / mean;
+        weight *= 2.0;
+        tau = (gamma * weight).mul_add::<FMA>(gamma, tau);
+    }
+    ((mean + geometric) * 0.5, tau)
 }
 
 #[cfg(test)]
@@ -217,9 +298,35 @@ mod tests {
     }
 
     #[test]
+    fn sums_of_potentials_are_those_of_single_loops() {
+        let mut potentials = Potentials::default();
+        let (mut expected, mut most) = (0.0, 0.0_f64);
+        for k in 0..21 {
+            // From close to the wire to far away, in the same lanes.
+            let at = RingPoint {
+                radius_m: 0.7,
+                r_m: 0.7 + 0.3 * 10.0_f64.powi(3 - k % 12),
+                offset_m: -0.3 * 10.0_f64.powi(3 - k % 12),
+                u_m: 0.01 * f64::from(k % 5),
+            };
+            let weight = 1.0 + 0.1 * f64::from(k);
+            potentials.add(at, weight);
+            let term = weight * ring_field(at).a_phi_over_r;
+            expected += term;
+            most = most.max(term);
+        }
+        assert!((potentials.sum() - expected).abs() < 1e-14 * most);
+        assert_eq!(potentials.sum(), 0.0);
+    }
+
+    #[test]
     fn mutual_inductance_is_reciprocal() {
-        let m = mutual_over_mu_0(0.7, 1.3, -0.6, 0.4);
-        let n = mutual_over_mu_0(1.3, 0.7, 0.6, 0.4);
+        let mutual = |radii_m, offset_m| {
+            let mut potentials = Potentials::default();
+            potentials.add_mutual(radii_m, [offset_m, 0.4], 1.0);
+            potentials.sum()
+        };
+        let (m, n) = (mutual([0.7, 1.3], -0.6), mutual([1.3, 0.7], 0.6));
         assert!((m - n).abs() < 1e-15 * m);
         let (_, _, a_phi) = by_azimuth(0.7, 1.3, 0.4);
         assert!((m - std::f64::consts::TAU * 1.3 * 1.3 * a_phi).abs() < 1e-14 * m);

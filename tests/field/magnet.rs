@@ -9,7 +9,7 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::dipole::{cylinder_moment_a_m2, tilted_moment_a_m2};
 use fluxform_field::frame::{CartesianField, to_cartesian};
 use fluxform_field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
-use fluxform_field::ring::mutual_over_mu_0;
+use fluxform_field::ring::Potentials;
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
 use fluxform_numerics::vec3::{cross, minus, norm, plus};
@@ -219,15 +219,15 @@ fn the_seeds_height_needs_few_nodes() {
     let flux = |z: f64| {
         let radius = 0.5 * SEED_MAGNET.diameter_m;
         let (radial, axial) = (gauss::rule(24), gauss::rule(48));
-        let mut sum = 0.0;
+        let mut loops = Potentials::default();
         for (x, wx) in radial.nodes.iter().zip(&radial.weights) {
             let a = 0.0155 + 0.0035 * x;
             for (y, wy) in axial.nodes.iter().zip(&axial.weights) {
                 let u = z + 0.05 + 0.05 * y;
-                sum += 0.25 * wx * wy * mutual_over_mu_0(a, radius, a - radius, u);
+                loops.add_mutual([a, radius], [a - radius, u], 0.25 * wx * wy);
             }
         }
-        MU_0_T_M_PER_A * SEED_COIL.turns * sum
+        MU_0_T_M_PER_A * SEED_COIL.turns * loops.sum()
     };
     let expected = -MAGNETIZATION_A_PER_M * (flux(0.035) - flux(0.025));
     let gz: Vec<_> = rule

@@ -12,6 +12,8 @@ use rayon::prelude::*;
 
 /// Nodes along a side of a rule beyond those of the layer's own, with which it is compared.
 const MORE_NODES: usize = 3;
+/// Part of what rules may differ by that the winding's own field may be off.
+const FIELD_SHARE: f64 = 1e-2;
 /// Most parts of panels: a winding whose edge lies on the surface itself is met by ever smaller ones.
 const MOST_PARTS: usize = 20_000;
 
@@ -157,7 +159,8 @@ impl Linkage<'_> {
         if let Some(b_z) = profile.and_then(|profile| profile.b_z(r_m)) {
             return Ok(b_z * node.area_m2[2]);
         }
-        let field = self.winding.field(r_m, z)?;
+        let tolerance = FIELD_SHARE * self.allowed;
+        let field = self.winding.field_to(r_m, z, tolerance)?;
         let field_t = to_cartesian(&field, dx, dy).field_t_per_a;
         Ok(fluxform_numerics::vec3::dot(field_t, node.area_m2))
     }
