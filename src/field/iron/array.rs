@@ -3,12 +3,13 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 use super::axial_profile::AxialProfile;
 pub use super::bodies::RESOLUTIONS;
 use super::bodies::{Coils, Iron};
 use super::clearance::is_within;
-use super::face::{Node, Point, SAME_M};
+use super::face::{Node, Panel, Point, SAME_M};
 use super::inductance::{Linkage, least_h};
 use super::panel_columns::Targets;
 use super::potential::Branch;
@@ -589,7 +590,9 @@ impl IronArray {
                 }
             }));
         }
-        let deep = |candidate: &&Candidate| self.is_deep(candidate.place_m, candidate.depth_m);
+        let faces = self.surface.whole_faces();
+        let is_deep = |place_m: Point, depth_m: f64| self.is_deep(&faces, place_m, depth_m);
+        let deep = |candidate: &&Candidate| is_deep(candidate.place_m, candidate.depth_m);
         let candidates: Vec<&Candidate> = nodes.par_iter().filter(deep).collect();
         let mut sparse: Vec<&Candidate> = Vec::new();
         for candidate in candidates {
@@ -625,7 +628,7 @@ impl IronArray {
             }
         }
         let climb = |best: Option<(f64, &Candidate)>| {
-            let peak = best.map(|(value, from)| self.climb(value, from, &fields_t));
+            let peak = best.map(|(value, from)| self.climb(value, from, &is_deep, &fields_t));
             peak.transpose()
         };
         let climbed = best.into_par_iter().map(climb);
@@ -638,13 +641,13 @@ impl IronArray {
     }
 
     /// Whether a place is as far inside the surface as that: about it a layer's field grows without bound.
-    fn is_deep(&self, place_m: Point, depth_m: f64) -> bool {
+    fn is_deep(&self, faces: &[(Panel, Range<usize>)], place_m: Point, depth_m: f64) -> bool {
         fluxform_base::progress::poll();
         let [cx, cy] = self.planes_m;
         let [x, y, z] = place_m;
         !self.images.iter().any(|[sx, sy]| {
             let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            is_within(&self.surface, own, DEEP * depth_m)
+            is_within(&self.surface, faces, own, DEEP * depth_m)
         })
     }
 
@@ -653,6 +656,7 @@ impl IronArray {
         &self,
         value_t: f64,
         from: &Candidate,
+        is_deep: &impl Fn(Point, f64) -> bool,
         fields_t: &impl Fn(&[Point]) -> Result<Vec<f64>, OnEdge>,
     ) -> Result<Peak, OnEdge> {
         let face = self.surface.face_of(from.number);
@@ -674,7 +678,7 @@ impl IronArray {
                 let node = Node { place_m, area_m2 };
                 let node = mirrored(&node, self.images[from.image], self.planes_m);
                 let place_m = inside(&node, from.depth_m);
-                if self.is_deep(place_m, from.depth_m) {
+                if is_deep(place_m, from.depth_m) {
                     beside.push([a, b]);
                     places_m.push(place_m);
                 }

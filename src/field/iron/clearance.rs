@@ -4,6 +4,7 @@ use super::bodies::Body;
 use super::face::{Face, Panel, Point};
 use super::surface::Surface;
 use fluxform_numerics::vec3::{dot, minus, norm};
+use std::ops::Range;
 
 /// Halvings of a face within which its distance from another body is looked for: two that lie along each other are
 /// as far apart everywhere.
@@ -36,15 +37,24 @@ pub fn meeting_m(a: &Body, b: &Body, least_m: f64) -> Option<Point> {
     of(a, b).or_else(|| of(b, a))
 }
 
-/// Whether a place of `surface` is closer to `place_m` than `least_m`.
-pub(super) fn is_within(surface: &Surface, place_m: Point, least_m: f64) -> bool {
+/// Whether a place of `surface`, whose [`Surface::whole_faces`] are `faces`, is closer to `place_m` than `least_m`.
+pub(super) fn is_within(
+    surface: &Surface,
+    faces: &[(Panel, Range<usize>)],
+    place_m: Point,
+    least_m: f64,
+) -> bool {
     let distance_m = |at| norm(minus(at, place_m));
-    surface.panels().iter().any(|panel| {
-        let away = minus(panel.centre_m, place_m);
+    let may_be = |piece: &Panel| {
+        let away = minus(piece.centre_m, place_m);
         let beside = |normal| dot(normal, away).abs() >= least_m;
+        !piece.plane.is_some_and(beside) && norm(away) - BULGE * piece.radius_m < least_m
+    };
+    let near = faces.iter().filter(|(whole, _)| may_be(whole));
+    let mut panels = near.flat_map(|(_, panels)| &surface.panels()[panels.clone()]);
+    panels.any(|panel| {
         let face = &surface.faces[panel.face];
-        !panel.plane.is_some_and(beside)
-            && closer_m(face, panel, &distance_m, least_m, MOST_ABOUT_A_PLACE).is_some()
+        may_be(panel) && closer_m(face, panel, &distance_m, least_m, MOST_ABOUT_A_PLACE).is_some()
     })
 }
 

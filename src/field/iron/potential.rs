@@ -8,6 +8,7 @@
 //! ```
 
 use crate::winding::Winding;
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::gauss;
 
 /// How a place is reached from below the winding.
@@ -32,39 +33,66 @@ impl Winding {
             Branch::Bore => self.turns * height,
             Branch::Above => self.turns,
         };
-        self.charged_face(r_m, z_m, tolerance)
-            - self.charged_face(r_m, z_m + self.length_m, tolerance)
-            - passed
+        let mut rings = Rings::default();
+        self.add_charged_face([r_m, z_m], 1.0, tolerance, &mut rings);
+        self.add_charged_face([r_m, z_m + self.length_m], -1.0, tolerance, &mut rings);
+        dispatch::run(rings) - passed
     }
 
-    /// f above.
-    fn charged_face(&self, r_m: f64, u_m: f64, tolerance: f64) -> f64 {
+    /// f above, times `sign`.
+    fn add_charged_face(&self, [r_m, u_m]: [f64; 2], sign: f64, tolerance: f64, rings: &mut Rings) {
         let (inner, outer) = (self.inner_radius_m, self.outer_radius_m);
-        let full = self.turns / self.length_m;
-        let mut sum = 0.0;
-        let mut part = |from: f64, to: f64| {
+        let full = sign * self.turns / self.length_m;
+        for [from, to] in [[0.0, inner], [inner, outer]] {
             if to <= from {
-                return;
+                continue;
             }
             gauss::graded(from - r_m, to - r_m, u_m, tolerance, |offset, weight| {
                 let a = r_m + offset;
                 let density = full * ((outer - a) / (outer - inner)).clamp(0.0, 1.0);
-                sum += weight * density * a / (2.0 * mean((a + r_m).hypot(u_m), offset.hypot(u_m)));
+                rings.farthest2_m2.push((a + r_m) * (a + r_m) + u_m * u_m);
+                rings.nearest2_m2.push(offset * offset + u_m * u_m);
+                rings.weights.push(0.5 * weight * density * a);
             });
-        };
-        part(0.0, inner);
-        part(inner, outer);
-        sum
+        }
     }
 }
 
-/// The arithmetic-geometric mean.
-fn mean(mut a: f64, mut b: f64) -> f64 {
-    while (a - b).abs() > 1e-9 * a {
-        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+/// Charged rings: squares of their farthest and nearest distance, and what is divided by the arithmetic-geometric mean
+/// of both distances and summed.
+#[derive(Default)]
+struct Rings {
+    farthest2_m2: Vec<f64>,
+    nearest2_m2: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Kernel for Rings {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> f64 {
+        let (far, near) = (
+            self.farthest2_m2.chunks(LANES),
+            self.nearest2_m2.chunks(LANES),
+        );
+        let mut sum = 0.0;
+        for ((far, near), weights) in far.zip(near).zip(self.weights.chunks(LANES)) {
+            let (mut a, mut b) = (Lanes::load(far).sqrt(), Lanes::load(near).sqrt());
+            let differ = |a: Lanes, b: Lanes| {
+                let pairs = a.0.iter().zip(&b.0);
+                pairs.fold(false, |any, (a, b)| any | ((a - b).abs() > 1e-9 * a))
+            };
+            while differ(a, b) {
+                (a, b) = ((a + b) * 0.5, (a * b).sqrt());
+            }
+            // One step more squares the difference.
+            let means = (a + b) * 0.5;
+            let terms = weights.iter().zip(means.0);
+            sum += terms.map(|(weight, mean)| weight / mean).sum::<f64>();
+        }
+        sum
     }
-    // One step more squares the difference.
-    0.5 * (a + b)
 }
 
 #[cfg(test)]

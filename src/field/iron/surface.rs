@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
 use super::near_windings::Windings;
@@ -139,8 +140,23 @@ impl Surface {
         &self.panels
     }
 
+    /// Every face as one panel, and the numbers of those that it is cut into.
+    pub(super) fn whole_faces(&self) -> Vec<(Panel, Range<usize>)> {
+        let faces = self.faces.iter().enumerate();
+        let mut start = 0;
+        faces
+            .map(|(number, face)| {
+                let panels = self.panels[start..].iter();
+                let first = start;
+                start += panels.take_while(|panel| panel.face == number).count();
+                let whole = Panel::new(face, number, [0.0, 1.0, 0.0, 1.0], 1);
+                (whole, first..start)
+            })
+            .collect()
+    }
+
     /// The nodes of a panel.
-    pub(super) fn nodes_of(&self, panel: usize) -> std::ops::Range<usize> {
+    pub(super) fn nodes_of(&self, panel: usize) -> Range<usize> {
         let first = self.firsts[panel];
         first..first + self.panels[panel].order.pow(2)
     }
@@ -208,15 +224,8 @@ impl Surface {
         distance_m: &(impl Fn(f64) -> f64 + Sync),
         tolerance: f64,
     ) -> (Vec<[f64; 6]>, Vec<f64>) {
-        let mut starts = vec![self.panels.len(); self.faces.len() + 1];
-        for (index, panel) in self.panels.iter().enumerate().rev() {
-            starts[panel.face] = index;
-        }
-        let parts: Vec<_> = (0..self.faces.len())
-            .into_par_iter()
-            .map(|number| {
-                let whole = Panel::new(&self.faces[number], number, [0.0, 1.0, 0.0, 1.0], 1);
-                let panels = starts[number]..starts[number + 1];
+        let parts: Vec<_> = (self.whole_faces().into_par_iter())
+            .map(|(whole, panels)| {
                 let mut out = (Vec::new(), Vec::new());
                 self.add_dipoles(
                     &whole, panels, drives, values, distance_m, tolerance, &mut out,
@@ -236,7 +245,7 @@ impl Surface {
     fn add_dipoles(
         &self,
         part: &Panel,
-        panels: std::ops::Range<usize>,
+        panels: Range<usize>,
         drives: usize,
         values: &[f64],
         distance_m: &impl Fn(f64) -> f64,
@@ -280,7 +289,7 @@ impl Surface {
         &self,
         part: &Panel,
         orders: [usize; 2],
-        panels: std::ops::Range<usize>,
+        panels: Range<usize>,
         drives: usize,
         values: &[f64],
     ) -> Vec<f64> {
