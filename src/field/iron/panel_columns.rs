@@ -88,9 +88,7 @@ impl Surface {
             });
         });
     }
-}
 
-impl Surface {
     /// B of the layer `values`, one per node, at a place off the surface, T.
     #[must_use]
     pub fn field_t(&self, target_m: Point, values: &[f64]) -> Point {
