@@ -191,7 +191,7 @@ mod tests {
         let n = 4000;
         let (mut b_z, mut b_r, mut a_phi) = (0.0, 0.0, 0.0);
         for k in 0..n {
-            let angle = std::f64::consts::TAU * (k as f64 + 0.5) / n as f64;
+            let angle = TAU * (k as f64 + 0.5) / n as f64;
             let c = angle.cos();
             let half = (0.5 * angle).sin();
             let dist2 = (a - r) * (a - r) + u * u + 4.0 * a * r * half * half;
@@ -288,7 +288,7 @@ mod tests {
                 offset_m: d,
                 u_m: 0.0,
             });
-            let wire = 1.0 / (std::f64::consts::TAU * d);
+            let wire = 1.0 / (TAU * d);
             let curvature = ((8.0 * a / d).ln()) / (4.0 * std::f64::consts::PI * a);
             assert!(
                 (ring.b_z - wire - curvature).abs() < 2.0 * wire * d / a,
@@ -329,6 +329,6 @@ mod tests {
         let (m, n) = (mutual([0.7, 1.3], -0.6), mutual([1.3, 0.7], 0.6));
         assert!((m - n).abs() < 1e-15 * m);
         let (_, _, a_phi) = by_azimuth(0.7, 1.3, 0.4);
-        assert!((m - std::f64::consts::TAU * 1.3 * 1.3 * a_phi).abs() < 1e-14 * m);
+        assert!((m - TAU * 1.3 * 1.3 * a_phi).abs() < 1e-14 * m);
     }
 }
