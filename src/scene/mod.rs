@@ -471,7 +471,8 @@ impl<'a> Scene<'a> {
         let components = N.min(3);
         let axes = axes_of(self.moment_a_m2);
         let whole = N > 1 || !rule.is_upright();
-        let parts = match (whole, rule.is_upright()) {
+        // Moments across an upright one take the whole gradient too.
+        let parts = match (whole, rule.is_upright() && N < 9) {
             (false, _) => Components::Gz,
             (true, true) => Components::Force,
             (true, false) => Components::Gradient,
