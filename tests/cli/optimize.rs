@@ -739,3 +739,25 @@ fn the_best_coil_is_drawn_among_those_around_it() {
         .ends(2)
         .says(&["only one can go to standard output"]);
 }
+
+/// Broke: where the best depth of a cored winding lay at a border of the search's table, no search got across it: there
+/// was no such coil, or one of another wire two thirds as strong.
+#[test]
+fn regression_a_cored_coil_beside_a_border_of_its_table_was_none() {
+    let place = Place::new();
+    let text = "name = 'o'\ncoil = { inner_diameter_mm = 14, outer_diameter_mm = 37.7, length_mm = 44.1 }\n\
+                wire = { diameter_mm = 0.7 }\ncore = { clearance_mm = 0.5, below_mm = 5 }\n\
+                array = { rows = 1, columns = 1, pitch_mm = 60 }\n\
+                limits = { outer_diameter_max_mm = 37.7, length_max_mm = 44.1, resistance_max_ohm = 5 }\n";
+    place.write("one.toml", text);
+    let two = text.replace("0.7 }", "0.7, choices_mm = [0.4, 0.7] }");
+    place.write("two.toml", &two);
+    for design in ["one.toml", "two.toml"] {
+        let args = ["optimize", design, "--starts", "6", "--format", "json"];
+        let found = place.run(&args).ends(0).json();
+        let wires = found["wires"].as_array().unwrap();
+        let force_n = wires.last().unwrap()["force_n"].as_f64().unwrap();
+        assert_eq!(found["status"], "optimal");
+        assert!((0.4575..0.4578).contains(&force_n), "{design}: {force_n}");
+    }
+}

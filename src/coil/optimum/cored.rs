@@ -592,10 +592,19 @@ impl CoilModel for CoredModel {
         self.air.length_scale_m()
     }
 
-    fn focus(&self, window: &Window) {
-        if let Ok(at) = self.coordinates(window) {
-            self.added.focus(at);
+    fn focus(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
+        let at = self.coordinates(window).ok()?;
+        self.added.focus(at);
+        if self.added.is_clear(at) {
+            return None;
         }
+        let added = Arc::new(Cells::new(COARSE_LATTICE));
+        added.focus(at);
+        Some(Box::new(Self {
+            coarse: Arc::clone(&added),
+            added,
+            ..self.clone()
+        }))
     }
 
     fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {

@@ -55,9 +55,16 @@ const CORNER: f64 = 0.98;
 /// The table.
 pub struct Cells {
     lattice: Lattice,
-    origin: OnceLock<[f64; 3]>,
+    frame: OnceLock<Frame>,
     axes: [Axis; 3],
     cells: Mutex<BTreeMap<[i64; 3], Arc<OnceLock<Cell>>>>,
+}
+
+/// Where the cells lie.
+#[derive(Clone, Copy)]
+struct Frame {
+    origin: [f64; 3],
+    width: [f64; 3],
 }
 
 struct Axis {
@@ -113,25 +120,46 @@ impl Cells {
         Self {
             axes: lattice.order.map(Axis::new),
             lattice,
-            origin: OnceLock::new(),
+            frame: OnceLock::new(),
             cells: Mutex::new(BTreeMap::new()),
         }
     }
 
-    /// Moves the cells along the first two axes so that one of them has `at` in its middle: the
-    /// third variable's origin is a border of the functions' domain. Without effect once a point
-    /// has been requested. Not for use within a parallel loop.
+    /// Moves the cells so that no border is near `at`: along the first two axes to have it in the middle of one; along
+    /// the third, whose origin is a border of the functions' domain, by narrower cells where it is not well within the
+    /// first. Without effect once a point has been requested. Not for use within a parallel loop.
     pub(crate) fn focus(&self, at: [f64; 3]) {
-        let mut origin = self.lattice.origin;
+        let Lattice {
+            mut origin,
+            mut width,
+            ..
+        } = self.lattice;
         for i in 0..2 {
-            origin[i] = at[i] - 0.5 * self.lattice.width[i];
+            origin[i] = at[i] - 0.5 * width[i];
+        }
+        let along = at[2] - origin[2];
+        if along > 0.75 * width[2] {
+            let below = (along / width[2] - 0.5).ceil().max(1.0);
+            width[2] = along / (below + 0.5);
         }
         // Later points find the cells where the first one did.
-        let _ = self.origin.set(origin);
+        let _ = self.frame.set(Frame { origin, width });
     }
 
-    fn origin(&self) -> [f64; 3] {
-        *self.origin.get_or_init(|| self.lattice.origin)
+    /// Whether no border of the cells, that of the domain apart, is near `at`.
+    pub(crate) fn is_clear(&self, at: [f64; 3]) -> bool {
+        const NEAR: f64 = 0.15;
+        let Frame { origin, width } = self.frame();
+        (0..3).all(|i| {
+            let place = (at[i] - origin[i]) / width[i];
+            let part = place - place.floor();
+            part <= 1.0 - NEAR && (part >= NEAR || (i == 2 && place < NEAR))
+        })
+    }
+
+    fn frame(&self) -> Frame {
+        let Lattice { origin, width, .. } = self.lattice;
+        *self.frame.get_or_init(|| Frame { origin, width })
     }
 
     /// How many cells have been requested.
@@ -146,8 +174,8 @@ impl Cells {
     }
 
     fn key(&self, at: [f64; 3]) -> [i64; 3] {
-        let origin = self.origin();
-        std::array::from_fn(|i| ((at[i] - origin[i]) / self.lattice.width[i]).floor() as i64)
+        let Frame { origin, width } = self.frame();
+        std::array::from_fn(|i| ((at[i] - origin[i]) / width[i]).floor() as i64)
     }
 
     /// Fills the cell of `at` on all threads, `line` giving the values for two variables at
@@ -172,7 +200,8 @@ impl Cells {
     }
 
     fn nodes(&self, axis: usize, key: i64) -> Vec<f64> {
-        let (origin, width) = (self.origin()[axis], self.lattice.width[axis]);
+        let Frame { origin, width } = self.frame();
+        let (origin, width) = (origin[axis], width[axis]);
         let place = |x: &f64| origin + width * (key as f64 + 0.5 * (1.0 + x));
         self.axes[axis].nodes.iter().map(place).collect()
     }
@@ -218,10 +247,11 @@ impl Cells {
         let key = self.key(at);
         let slot = self.slot(key);
         let filled = slot.get()?.as_ref()?;
+        let Frame { origin, width } = self.frame();
         let errors = filled.errors.get_or_init(|| {
             let [first, second, third] = [0, 1, 2].map(|axis| {
-                let low = self.origin()[axis] + self.lattice.width[axis] * key[axis] as f64;
-                move |x: f64| low + 0.5 * self.lattice.width[axis] * (1.0 + x)
+                let low = origin[axis] + width[axis] * key[axis] as f64;
+                move |x: f64| low + 0.5 * width[axis] * (1.0 + x)
             });
             let nodes = &self.axes[2].nodes;
             let between = nodes.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
@@ -243,14 +273,14 @@ impl Cells {
             errors
         });
         let share = (0..3).fold(0.0_f64, |share, i| {
-            let place = (at[i] - self.origin()[i]) / self.lattice.width[i] - key[i] as f64;
+            let place = (at[i] - origin[i]) / width[i] - key[i] as f64;
             share.max(self.axes[i].height(2.0 * place - 1.0))
         });
         Some(errors.map(|error| error * share))
     }
 
     fn interpolate(&self, values: &[Values], key: [i64; 3], at: [f64; 3]) -> [Interpolated; COUNT] {
-        let (origin, width) = (self.origin(), self.lattice.width);
+        let Frame { origin, width } = self.frame();
         let [x, y, z]: [[Vec<f64>; 2]; 3] = std::array::from_fn(|i| {
             let low = origin[i] + width[i] * key[i] as f64;
             self.axes[i].weights(2.0 * (at[i] - low) / width[i] - 1.0)

@@ -240,9 +240,11 @@ pub trait CoilModel: Sync {
         None
     }
 
-    /// Says about which window a model that tabulates will be evaluated at most; the first time alone
-    /// counts. Not for use within a parallel loop.
-    fn focus(&self, _window: &Window) {}
+    /// Says about which window a model that tabulates will be evaluated at most. Its table follows the first time; later,
+    /// where a border of the table is near, the model with a table of its own. Not for use within a parallel loop.
+    fn focus(&self, _window: &Window) -> Option<Box<dyn CoilModel>> {
+        None
+    }
 
     /// The same coil computed more exactly about `window`, where the model is a coarse one meant
     /// for the search. Not for use within a parallel loop.

@@ -218,9 +218,10 @@ fn search(
             evaluations += found.iter().map(|local| local.evaluations).sum::<usize>();
             let doubt = |x| draft.model.doubts(&Problem::window(x)).force_ln;
             let starts = promising(&draft, doubt, found);
-            if let Some(best) = starts.first() {
-                problem.model.focus(&Problem::window(*best));
-            }
+            let best = starts.first().map(|best| Problem::window(*best));
+            let own = best.and_then(|best| problem.model.focus(&best));
+            let on_own = own.as_ref().map(|model| problem.with_model(&**model));
+            let problem = on_own.as_ref().unwrap_or(problem);
             let mut ends = Vec::new();
             // Smaller ones where the limits turn out to be tighter than on the draft.
             for less in SMALLER {
@@ -232,6 +233,13 @@ fn search(
                 {
                     break;
                 }
+            }
+            // The given coil counts as it is where no search leads to one that meets the limits.
+            let is_met = |local: &Local| local.violation(problem) <= FEASIBLE;
+            if !ends.iter().any(is_met) {
+                let initial = settings.initial.as_ref().map(Problem::coordinates);
+                ends.extend(locals(problem, initial.into_iter().collect(), 0, progress)?);
+                ends.extend(initial.and_then(|x| Local::at(problem, x)));
             }
             ends
         }

@@ -105,6 +105,17 @@ pub(super) const ACTIVE: f64 = 1e-9;
 const REMOVE: [f64; 4] = [1.0, 0.5, 0.1, 0.0];
 
 impl Local {
+    /// A point as it is; `None` outside the domain.
+    pub(super) fn at(problem: &dyn Smooth, x: [f64; 3]) -> Option<Self> {
+        let point = problem.at(x)?;
+        Some(Self {
+            x,
+            multipliers: vec![0.0; point.rows.len()],
+            point,
+            evaluations: 1,
+        })
+    }
+
     /// The largest violation.
     #[must_use]
     pub fn violation(&self, problem: &dyn Smooth) -> f64 {
