@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::array_check::LARGEST;
 use super::artefact::Input;
 use super::read_table::{TableError, read_numbered};
 use super::table::{Column, GRADIENT_COLUMNS, write_columns};
@@ -117,6 +118,14 @@ impl Scan {
         requested.extend(drives.iter().map(|(column, _)| column.clone()));
         let requested: Vec<&str> = requested.iter().map(String::as_str).collect();
         let (columns, lines) = read_numbered(name, bytes, &requested, &[])?;
+        for (column, values) in requested.iter().zip(&columns) {
+            if let Some(row) = values.iter().position(|value| value.abs() > LARGEST) {
+                return Err(TableError::one(format!(
+                    "{name}:{}: column {column}: {} is beyond {LARGEST:e}, which no sensor measures",
+                    lines[row], values[row]
+                )));
+            }
+        }
         let (places, rest) = columns.split_at(3);
         let (measured, driven) = rest.split_at(quantities.len());
         let currents_a = flowing(name, &drives, driven, &lines, coils)?;

@@ -14,8 +14,6 @@ use super::bounded_svd::svd;
 pub const CUTOFF: f64 = 1e-5;
 /// A column whose share in the directions left out exceeds this is not determined.
 const SHARE: f64 = 1e-4;
-/// Columns with a smaller component in a direction are not named with it.
-const NAMED: f64 = 0.05;
 
 /// The solution.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +62,10 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
         return solution;
     };
     let largest = singular_values.iter().copied().fold(0.0, f64::max);
+    let lost = singular_values
+        .iter()
+        .filter(|singular| **singular <= CUTOFF * largest)
+        .count();
     let mut null_share = vec![0.0; used.len()];
     let mut variance = vec![0.0; used.len()];
     for (k, &singular) in singular_values.iter().enumerate() {
@@ -80,7 +82,7 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
             for (share, part) in null_share.iter_mut().zip(direction.iter()) {
                 *share += part * part;
             }
-            let named = (0..used.len()).filter(|j| direction[*j].abs() > NAMED);
+            let named = (0..used.len()).filter(|j| direction[*j].powi(2) > SHARE / lost as f64);
             solution.degenerate.push(named.map(|j| used[j]).collect());
         }
     }

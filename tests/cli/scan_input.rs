@@ -234,3 +234,30 @@ fn a_scan_without_rows_is_called_that() {
     assert!(!ran.err.contains("current is 0"), "{}", ran.err);
     ran.says(&["-: the table has a header and no rows"]);
 }
+
+/// Broke: a field of 1e160 T was fitted, with NaN of what is left on screen and no JSON.
+#[test]
+fn what_no_sensor_measures_is_refused_with_its_place() {
+    let place = Place::new();
+    let mut rows = rows(&place);
+    rows[7][5] = 1e160;
+    place.write("scan.csv", &scan(&rows, BY_ROW, FIELD));
+    place
+        .run(&["probe", SEED, "--compare", "scan.csv"])
+        .ends(3)
+        .says(&["scan.csv:9: column bz_t: ", "no sensor measures"]);
+}
+
+/// Broke: of a coil whose field is 0 everywhere the leads were said to be swapped.
+#[test]
+fn a_coil_without_any_field_is_said_to_show_none() {
+    let place = Place::new();
+    let none = rows(&place)
+        .into_iter()
+        .map(|[x, y, z, ..]| [x, y, z, 0.0, 0.0, 0.0]);
+    place.write("scan.csv", &scan(&none.collect::<Vec<_>>(), BY_ROW, FIELD));
+    let ran = place.run(&["probe", SEED, "--compare", "scan.csv"]).ends(0);
+    let ran = ran.says(&["coil 4: the scan shows no field of it"]);
+    assert!(!ran.err.contains("swapped"), "{}", ran.err);
+    assert!(!ran.out.contains("of the measured"), "{}", ran.out);
+}

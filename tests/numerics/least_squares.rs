@@ -53,3 +53,18 @@ fn fewer_rows_than_columns_determine_nothing_alone() {
     assert!(fit.unit_errors.iter().all(Option::is_none));
     assert!(solve(&[vec![]], &[]).unit_errors[0].is_none());
 }
+
+/// Broke: a column that enters a direction without effect by less than a twentieth had no error, and no name.
+#[test]
+fn every_column_without_an_error_is_named() {
+    let a = vec![0.7, 1.3, -0.3, 2.1, 0.9];
+    let b = vec![0.2, -1.1, 0.9, 0.4, -0.6];
+    let c: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a + 0.03 * b).collect();
+    let fit = solve(&[a.clone(), b, c], &a);
+    assert_eq!(fit.rank, 2);
+    for (column, error) in fit.unit_errors.iter().enumerate() {
+        let is_named = fit.degenerate.iter().flatten().any(|one| *one == column);
+        assert_eq!(error.is_none(), is_named, "{column}: {fit:?}");
+    }
+    assert!(fit.unit_errors.iter().all(Option::is_none));
+}

@@ -229,7 +229,7 @@ fn noise_rows(sheet: &mut Sheet, fitted: &Left) {
 fn left(left: &Left) -> String {
     let mut lines = Vec::new();
     let mut line = |rms: String,
-                    part: f64,
+                    part: String,
                     largest: String,
                     at: &ScanPlace,
                     [stated, estimated]: [Option<String>; 2],
@@ -238,13 +238,14 @@ fn left(left: &Left) -> String {
         let estimated = estimated.map(|noise| format!(", estimated noise {noise}"));
         let noise = stated.or(estimated).unwrap_or_default();
         lines.push(format!(
-            "rms {rms} ({} of the measured){noise}; largest {largest}, {} in line {}; computed to {model}",
-            percent(part),
-            at.column,
-            at.line
+            "rms {rms}{part}{noise}; largest {largest}, {} in line {}; computed to {model}",
+            at.column, at.line
         ));
     };
-    let part = |rms: f64, of: f64| if of > 0.0 { rms / of } else { 0.0 };
+    let part = |rms: f64, of: f64| match rms / of {
+        part if of > 0.0 => format!(" ({} of the measured)", percent(part)),
+        _ => String::new(),
+    };
     if let Some(f) = &left.field {
         line(
             si(f.rms_t, "T"),

@@ -495,7 +495,9 @@ fn warnings_of_scales(parameters: &[Parameter], noisy: &NoisyFit) -> Vec<String>
 }
 
 fn scale_warning(coil: usize, scale: f64, error: f64) -> Option<String> {
-    if scale.abs() <= 3.0 * error {
+    // No sensor measures a field of it that is less.
+    const NOTHING: f64 = 1e-9;
+    if scale.abs() <= (3.0 * error).max(NOTHING) {
         return Some(format!(
             "coil {coil}: the scan shows no field of it beyond three standard errors; is it \
              connected, and the number right?"
