@@ -156,7 +156,7 @@ impl PullMoments {
 }
 
 /// The steel's pull on a moment along the magnet's own axis and both across, over that on a moment 1 along it: that of
-/// the moment's image in a half space of steel.
+/// the image of an upright magnet's moment in a half space of steel.
 #[must_use]
 pub fn relative_pull([along, across, other]: [f64; 3]) -> f64 {
     along * along + 0.5 * (across * across + other * other)

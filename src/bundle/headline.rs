@@ -218,7 +218,8 @@ pub struct FeltForce {
 /// What is left out where the unpowered steel's upward pull counts.
 pub const SIDEWAYS_PULL: &str = "sideways pull of the unpowered steel";
 /// What is left out where that pull counts and the magnet may tilt.
-const TILTED_PULL: &str = "the pull's change with the finger's tilt beside an edge of the steel: it is taken as above a half space";
+const TILTED_PULL: &str = "the pull's change with the finger's tilt beside an edge of the steel, or of a magnet that is not \
+                           upright: it is that of an upright one above a half space";
 /// Effects that no part of the felt error covers.
 const NOT_MODELLED: [&str; 6] = [
     "delays of sensor and drivers (`replay --dynamics` follows the coils' currents)",

@@ -42,7 +42,7 @@ impl Drivers {
     ///
     /// Heat is convex, so all currents but one are at an end. A coil that is no hotter at u_i than at l_i stays at
     /// l_i, which leaves the others most of the sum. Which of the others go to u_i, and which one in between, is a
-    /// knapsack problem, solved by branch and bound over kinds of coils with the same ends; beyond [`MOST_NODES`] of
+    /// knapsack problem, solved by branch and bound over kinds of coils with the same ends; beyond a number of nodes of
     /// its tree its linear relaxation is returned: an upper bound, by less than the heat of one coil at u_i.
     #[must_use]
     pub fn most_heat_w(&self, voltage_v: Option<f64>, resistance_ohm: f64) -> [f64; 2] {
