@@ -266,19 +266,11 @@ mod tests {
         // Even over a disc: the square of the radius is even.
         let tilt = |u: f64| (given.tilt_deg.to_radians() * u.sqrt()).cos();
         let moments = given.moments();
-        // Strength and tilt are independent.
-        let both = |of: &dyn Fn(f64, f64) -> f64| {
-            let (coarse, steps) = (|k: i32| (f64::from(k) + 0.5) / 1500.0, 0..1500);
-            let of_strength = |strength: f64| {
-                let of_tilt = |k: i32| {
-                    let cos = strength * tilt(coarse(k));
-                    let sin = (strength * strength - cos * cos).sqrt();
-                    of(cos, relative_pull([cos, 0.6 * sin, 0.8 * sin]))
-                };
-                steps.clone().map(of_tilt).sum::<f64>() / 1500.0
-            };
-            let strengths = steps.clone().map(|k| given.strength(coarse(k)));
-            strengths.map(of_strength).sum::<f64>() / 1500.0
+        // Strength and tilt are independent; the pull goes with the square of the strength.
+        let strength = |power: i32| mean(&|u| given.strength(u).powi(power));
+        let pull = |u: f64| {
+            let (cos, sin) = (tilt(u), (1.0 - tilt(u).powi(2)).sqrt());
+            relative_pull([cos, 0.6 * sin, 0.8 * sin])
         };
         for (found, expected) in [
             (moments.gain, mean(&|u| given.strength(u))),
@@ -293,14 +285,17 @@ mod tests {
                 moments.driver_square,
                 mean(&|u| (given.driver * (2.0 * u - 1.0)).powi(2)),
             ),
-            (moments.pull.mean, both(&|_, pull| pull)),
-            (moments.pull.square, both(&|_, pull| pull * pull)),
+            (moments.pull.mean, strength(2) * mean(&pull)),
+            (
+                moments.pull.square,
+                strength(4) * mean(&|u| pull(u).powi(2)),
+            ),
             (
                 moments.pull.times_moment,
-                both(&|moment, pull| moment * pull),
+                strength(3) * mean(&|u| tilt(u) * pull(u)),
             ),
         ] {
-            assert!((found - expected).abs() < 3e-8, "{found} {expected}");
+            assert!((found - expected).abs() < 1e-8, "{found} {expected}");
         }
         let exact_but_for_tilt = Uncertainty::default();
         let exact = exact_but_for_tilt.moments();

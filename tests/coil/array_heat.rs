@@ -96,11 +96,11 @@ fn regression_different_lower_ends_state_what_their_currents_can_give() {
     }
 }
 
-/// Two hundred coils, all with other ends or of three kinds: above every choice of random currents, and within a
-/// millionth of the relaxation's bound where many coils make that tight.
+/// Of three kinds, or all with other ends: close below the relaxation, which a search that is given up would state.
 #[test]
 fn many_coils_of_different_ends_are_searched_to_the_end() {
     let mut random = Random::new(41);
+    let mut bound = 0;
     for trial in 0..30 {
         let kinds: Vec<[f64; 2]> = (0..3)
             .map(|_| [-1.5 * random.unit(), 2.0 * random.unit()])
@@ -123,6 +123,14 @@ fn many_coils_of_different_ends_are_searched_to_the_end() {
             relaxed_w += raised_a * (low + high);
             left_a -= raised_a;
         }
+        // Where the sum binds some coil stays between its ends.
+        if left_a == 0.0 {
+            bound += 1;
+            assert!(
+                stated_w < relaxed_w * (1.0 - 1e-12),
+                "{stated_w} {relaxed_w}"
+            );
+        }
         assert!(
             stated_w <= relaxed_w * (1.0 + 1e-12),
             "{stated_w} {relaxed_w}"
@@ -132,6 +140,7 @@ fn many_coils_of_different_ends_are_searched_to_the_end() {
             "{stated_w} {relaxed_w}"
         );
     }
+    assert!(bound >= 15, "{bound}");
 }
 
 #[test]
