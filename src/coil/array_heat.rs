@@ -86,8 +86,35 @@ impl Drivers {
         }
         most
     }
+
+    /// The least resistance of each coil, ohm, from `from_ohm` on, at which the most heat of all coils is not above
+    /// `heat_w` at a supply of `voltage_v`: a lower bound of it, near enough where the heat falls with the resistance.
+    ///
+    /// More resistance leaves less current, so from R_1 to R_2 the heat is at least R_1 times the squares at R_2: as
+    /// long as that is above `heat_w` no resistance between them is enough.
+    #[must_use]
+    pub fn least_resistance_ohm(&self, voltage_v: f64, heat_w: f64, from_ohm: f64) -> f64 {
+        let mut least_ohm = from_ohm;
+        let mut step = 1.0;
+        for _ in 0..MOST_STEPS {
+            if step <= ROUNDING {
+                break;
+            }
+            let next_ohm = least_ohm * (1.0 + step);
+            let [next_w, _] = self.most_heat_w(Some(voltage_v), next_ohm);
+            if next_w / next_ohm * least_ohm > heat_w {
+                least_ohm = next_ohm;
+                step *= 2.0;
+            } else {
+                step *= 0.5;
+            }
+        }
+        least_ohm
+    }
 }
 
+/// Steps towards a least resistance at most.
+const MOST_STEPS: usize = 500;
 /// Nodes of the search's tree at most.
 const MOST_NODES: usize = 200_000;
 /// A bound above what is known by no more than this share promises nothing.

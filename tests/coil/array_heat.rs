@@ -166,3 +166,29 @@ fn the_heat_of_all_coils_has_the_slope_of_small_steps() {
         assert!((slope - by).abs() < 1e-7 * value, "{ohm}: {slope} {by}");
     }
 }
+
+#[test]
+fn below_the_least_resistance_all_coils_are_too_hot() {
+    let mut random = Random::new(11);
+    let mut falls = 0;
+    for trial in 0..300 {
+        let count = 1 + trial % 5;
+        let ends_a: Vec<[f64; 2]> = (0..count)
+            .map(|_| [-2.0 * random.unit(), 0.3 + 2.0 * random.unit()])
+            .collect();
+        let total_a = (trial % 2 == 0).then(|| 3.0 * random.unit());
+        let drivers = drivers(ends_a, total_a);
+        let heat_w = |ohm| drivers.most_heat_w(Some(10.0), ohm)[0];
+        let most_w = heat_w(4.0) * (0.2 + random.unit());
+        let least_ohm = drivers.least_resistance_ohm(10.0, most_w, 4.0);
+        let below = (0..200).map(|k| 4.0 + (least_ohm - 4.0) * f64::from(k) / 200.0);
+        assert!(least_ohm == 4.0 || below.into_iter().all(|ohm| heat_w(ohm) > most_w));
+        let [at_w, slope] = drivers.most_heat_w(Some(10.0), least_ohm);
+        if least_ohm > 4.0 && slope < 0.0 {
+            assert!((at_w / most_w - 1.0).abs() < 1e-11, "{at_w} {most_w}");
+            falls += 1;
+        }
+        assert!(at_w <= most_w * (1.0 + 1e-11), "{at_w} {most_w}");
+    }
+    assert!(falls >= 100, "{falls}");
+}

@@ -117,7 +117,8 @@ pub(super) struct Strongest<'a, C: CoilSets> {
 }
 
 impl<'a, C: CoilSets> Strongest<'a, C> {
-    /// Searches among `problems`' coils, some of which are `known`, taking at most `budget` sets apart.
+    /// Searches among `problems`' coils, some of which are `known`, taking sets apart until there were `budget`
+    /// of them or of their boxes.
     ///
     /// # Errors
     /// Interruption.
@@ -218,7 +219,6 @@ impl<'a, C: CoilSets> Strongest<'a, C> {
                     }
                 }
             }
-            taken += sets.len();
             let parts: Vec<Result<Parts<C::Set>, Interrupted>> = sets
                 .par_iter()
                 .map(|(of, set)| {
@@ -227,7 +227,9 @@ impl<'a, C: CoilSets> Strongest<'a, C> {
                 })
                 .collect();
             for ((of, _), parts) in sets.iter().zip(parts) {
-                self.add(*of, parts?);
+                let parts = parts?;
+                taken += parts.cells.max(1);
+                self.add(*of, parts);
             }
         }
         Ok(())

@@ -80,7 +80,7 @@ impl<'a> BoundedCoils<'a> {
             .best
             .as_ref()
             .map_or_else(Multipliers::default, |local| {
-                Multipliers::of(problem, &local.multipliers)
+                Multipliers::of(problem, local)
             });
         let with_settling = multipliers.settling > 0.0 || solved.best.is_none();
         Some(Self {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use super::problem::{LimitName, Problem, Regime};
+use super::problem::{Bounded, LimitName, Problem, Regime};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_design::message_text::number;
@@ -47,7 +47,11 @@ impl Domain {
         let limit = |name| problem.limit_of(name);
         let wire_m = problem.strand.diameter_m;
         let per_volume = problem.strand.resistance_per_volume();
-        let mut least = 0.0_f64;
+        let least_ohm = problem
+            .bounds
+            .iter()
+            .filter_map(|bound| least_resistance_ohm(problem, bound));
+        let least = least_ohm.fold(0.0, f64::max) / per_volume;
         let mut most = f64::INFINITY;
         for bound in &problem.bounds {
             let resistance = match (bound.name, problem.regime) {
@@ -75,16 +79,6 @@ impl Domain {
                 }
                 (LimitName::WireLength, _) => {
                     most = most.min(bound.limit / problem.strand.length_per_volume());
-                    continue;
-                }
-                (LimitName::Power, Regime::Supply) => {
-                    let voltage_v = problem.task.voltage_v.unwrap_or(0.0);
-                    least = least.max(voltage_v / bound.limit * voltage_v / per_volume);
-                    continue;
-                }
-                (LimitName::Current, _) => {
-                    let voltage_v = problem.task.voltage_v.unwrap_or(0.0);
-                    least = least.max(voltage_v / bound.limit / per_volume);
                     continue;
                 }
                 _ => continue,
@@ -137,11 +131,11 @@ impl Domain {
         if least <= most * (1.0 + TOUCHING) {
             return None;
         }
-        let lower = if problem.limit_of(LimitName::Power).is_some() {
-            LimitName::Power
-        } else {
-            LimitName::Current
-        };
+        let bounds = problem.bounds.iter();
+        let lower = bounds
+            .filter_map(|bound| Some((bound.name, least_resistance_ohm(problem, bound)?)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?
+            .0;
         let ratio = least / most;
         Some(Contradiction {
             between: [LimitName::Resistance, lower],
@@ -214,6 +208,24 @@ impl Domain {
             ln(self.depth_min_m.max(1e-3 * deepest), deepest),
             ln(self.length_m[0].max(1e-3 * longest), longest),
         ]
+    }
+}
+
+/// The least resistance, ohm, that a limit asks for where the supply's voltage sets the current.
+fn least_resistance_ohm(problem: &Problem<'_>, bound: &Bounded) -> Option<f64> {
+    let task = problem.task;
+    let voltage_v = task
+        .voltage_v
+        .filter(|_| problem.regime == Regime::Supply)?;
+    match bound.name {
+        LimitName::Current => Some(voltage_v / bound.limit),
+        LimitName::Power => Some(voltage_v / bound.limit * voltage_v),
+        LimitName::ArrayPower => {
+            let from_ohm = voltage_v / task.current_max_a;
+            let drivers = &task.drivers;
+            Some(drivers.least_resistance_ohm(voltage_v, bound.limit, from_ohm))
+        }
+        _ => None,
     }
 }
 

@@ -18,6 +18,7 @@ use super::axis_gradient::{self, axis_gradient};
 use super::domain::Domain;
 use super::model::Window;
 use super::problem::{LimitName, Problem, Regime};
+use super::sqp::Local;
 use crate::circuit::SETTLING_TIME_CONSTANTS;
 use crate::section_integrals::{ROUGH, section_integrals};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -50,12 +51,20 @@ pub struct Multipliers {
 impl Multipliers {
     /// Those of a local optimum.
     #[must_use]
-    pub fn of(problem: &Problem<'_>, multipliers: &[f64]) -> Self {
+    pub fn of(problem: &Problem<'_>, local: &Local) -> Self {
         let mut sums = Self::default();
-        for (bound, &lambda) in problem.bounds.iter().zip(multipliers) {
+        for (bound, &lambda) in problem.bounds.iter().zip(&local.multipliers) {
             match (bound.name, problem.regime) {
                 (LimitName::Current, _) | (LimitName::Power, Regime::Supply) => {
                     sums.least += lambda.max(0.0);
+                }
+                // Where the heat falls with the resistance it asks for a least one.
+                (LimitName::ArrayPower, Regime::Supply) => {
+                    let volume_m3 = Problem::window(local.x).volume_over_pi_m3().value;
+                    let resistance_ohm = volume_m3 * problem.strand.resistance_per_volume();
+                    let [heat_w, by_ohm] = problem.task.array_heat_w(resistance_ohm);
+                    let falls = (-by_ohm * resistance_ohm / heat_w).max(0.0);
+                    sums.least += lambda.max(0.0) * falls;
                 }
                 (
                     LimitName::Resistance

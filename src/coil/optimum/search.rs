@@ -356,7 +356,7 @@ fn bound(
         .best
         .as_ref()
         .map_or_else(Multipliers::default, |local| {
-            Multipliers::of(&solved.problem, &local.multipliers)
+            Multipliers::of(&solved.problem, local)
         });
     let limited = domain.settling_max_s.is_finite();
     let problem = &solved.problem;

@@ -74,7 +74,7 @@ pub fn optimise_wound(
         }
     }
     progress.begin("wind", open.len() as u64);
-    let search = Strongest::of(&coils, known, settings.cells / 4, progress)?;
+    let search = Strongest::of(&coils, known, settings.cells / 2, progress)?;
     progress.end();
     let certificate = |best: &BestCoil| {
         let top_ln = best.force_n.ln();
