@@ -83,7 +83,7 @@ impl BudgetName {
     /// The remedy, as the headline prints it.
     fn to_halve(self) -> &'static str {
         match self {
-            Self::Points => "take about 1.5 times as many points along x and y",
+            Self::Points => "take about twice as many points, 1.5 times along x and y of a grid",
             Self::Heights => "export the surface with half the chord tolerance",
             Self::BetweenPoints => {
                 "take 1.4 times as many points along x and y, or let --refine add heights"

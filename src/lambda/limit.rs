@@ -26,7 +26,7 @@ use super::solve::constant;
 
 /// The difference from nothing, and from what cannot be known.
 const ALL: f64 = 1.0;
-/// Ways to lay blocks of two by two cells; of scattered points every fourth is taken.
+/// Ways to lay blocks of two by two cells.
 const SUBSETS: usize = 4;
 /// The rounding error of a weight, relative to the largest.
 const ROUNDING: f64 = 1e-9;
@@ -85,8 +85,7 @@ pub struct FineSamples<'a> {
 /// Estimate of |lambda / limit - 1| of the chosen constant of `problem`, which is `lambda_n_per_m`,
 /// against the limit of ever more points. `areas` holds the plan area that each point stands for (> 0,
 /// any unit), whether or not the problem weighs by it; `fine` takes the place of the points in cells
-/// that are not smooth. Of points on no grid (`places` is `None`) every fourth is taken, which is an
-/// estimate where they are spread at random. A rule without a constant, or with 0, differs by all of it; so it
+/// that are not smooth. A rule without a constant, or with 0, differs by all of it; so it
 /// does where there is no rule to compare with: fewer than three points along an axis of several. Of several rules
 /// those whose path cannot be followed are left out.
 ///
@@ -96,7 +95,7 @@ pub fn limit_error(
     problem: &ForceProblem,
     lambda_n_per_m: f64,
     areas: &[f64],
-    places: Option<GridPlaces>,
+    places: GridPlaces,
     fine: Option<FineSamples>,
     settings: &Settings,
 ) -> Result<f64, ProblemError> {
@@ -130,16 +129,13 @@ pub fn limit_error(
     };
     let of_cells = apart(by_points).unwrap_or(ALL);
     let subsets: Vec<usize> = (0..SUBSETS).collect();
-    let of_spacing = match places {
+    let of_spacing = match settings.criterion {
         // The least over places: the one that decides may be a sample, or a corner of every block.
-        Some(places) if settings.criterion == Criterion::Maxmin => largest(&subsets, |&which| {
-            let samples = fine.map(|fine| one_of(2, fine.areas, which % 2));
+        Criterion::Maxmin => largest(&subsets, |&which| {
+            let samples = fine.map(|fine| every_other(fine.areas, which % 2));
             differs(&places.every_second(areas, which), samples.as_deref())
         })?,
-        Some(places) => spacing_off(places, areas, (of_cells, fine), differs)?,
-        None => largest(&subsets, |&which| {
-            differs(&one_of(SUBSETS, areas, which), None)
-        })?,
+        _ => spacing_off(places, areas, (of_cells, fine), differs)?,
     };
     let of_samples = match fine {
         Some(fine) => {
@@ -214,9 +210,9 @@ fn largest<T: Sync>(
     Ok(most.unwrap_or(ALL))
 }
 
-/// The weights of the `which`-th of every `count` points.
-fn one_of(count: usize, areas: &[f64], which: usize) -> Vec<f64> {
-    let weight = |(point, area): (usize, &f64)| match point % count == which {
+/// The weights of the `which`-th of every two points.
+fn every_other(areas: &[f64], which: usize) -> Vec<f64> {
+    let weight = |(point, area): (usize, &f64)| match point % 2 == which {
         true => *area,
         false => 0.0,
     };

@@ -244,7 +244,6 @@ impl Sampled {
             stand_in: &self.fine.stand_in,
             point_areas: &self.fine.point_area_m2,
         });
-        let places = Some(places);
         limit_error(problem, lambda, &self.areas, places, fine, settings).unwrap()
     }
 }

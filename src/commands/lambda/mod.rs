@@ -20,6 +20,7 @@ mod warnings;
 mod working_point;
 
 use std::borrow::Cow;
+use std::f64::consts::SQRT_2;
 
 use serde::Serialize;
 
@@ -268,11 +269,11 @@ pub fn run(
     let chosen = (sampled.as_ref().map(ForcePoints::of_scattered)).transpose()?;
     let others = match sampling.zip(chosen.as_ref()) {
         Some((how, chosen)) => {
-            other_patches(how, chosen, |how| ForcePoints::of_scattered(&sample(how)?))?
+            other_points(how, chosen, |how| ForcePoints::of_scattered(&sample(how)?))?
         }
-        None => Vec::new(),
+        None => OtherPoints::default(),
     };
-    let of_all = [&of_grid].into_iter().chain(&chosen).chain(&others);
+    let of_all = [&of_grid].into_iter().chain(&chosen).chain(&others.points);
     let lowest_m = lowest_place_m(&scene, of_all, options);
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
@@ -314,13 +315,16 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = whole(&chosen)?;
-    if !others.is_empty() {
-        let others = others.iter().map(|points| solve_with(points, &plain));
-        let others = others.collect::<Result<Vec<_>, RunError>>()?;
-        report.add_quadrature(quadrature(&report.file, &others));
-    } else if !report.file.accuracy.contains_key("lambda_of_points") {
-        report.add_quadrature(off_grid(&report.file, &grid));
-    }
+    report.add_quadrature(if others.points.is_empty() {
+        off_grid(&report.file, &grid)
+    } else {
+        let files = others
+            .points
+            .iter()
+            .map(|points| solve_with(points, &plain));
+        let files = files.collect::<Result<Vec<_>, RunError>>()?;
+        quadrature(&report.file, &files, others.method)
+    });
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
 }
@@ -402,20 +406,37 @@ pub(crate) fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
     }
 }
 
+/// Points on no grid that others are compared with.
+#[derive(Default)]
+struct OtherPoints {
+    points: Vec<ForcePoints>,
+    /// How the comparison is stated.
+    method: &'static str,
+}
+
 /// Points of patches twice as wide where the deviation decides, and where the width does: errors of both may have
 /// opposite signs. Where the width decides of few patches, which may be whole faces already, of half that width. None
-/// for random points, nor where they are the same as the `chosen`.
-fn other_patches(
+/// that are the same as the `chosen`. Of random points as many others, and half as many, which are off twice as far.
+fn other_points(
     how: Sampling,
     chosen: &ForcePoints,
     points_of: impl Fn(Sampling) -> Result<ForcePoints, RunError>,
-) -> Result<Vec<ForcePoints>, RunError> {
-    let Sampling::Adaptive {
-        max_deviation_m,
-        widest_m: Some(widest_m),
-    } = how
-    else {
-        return Ok(Vec::new());
+) -> Result<OtherPoints, RunError> {
+    let (max_deviation_m, widest_m) = match how {
+        Sampling::Adaptive {
+            max_deviation_m,
+            widest_m: Some(widest_m),
+        } => (max_deviation_m, widest_m),
+        Sampling::Adaptive { widest_m: None, .. } => return Ok(OtherPoints::default()),
+        Sampling::Poisson { spacing_m, seed } => {
+            let points = |spacing_m, seed| points_of(Sampling::Poisson { spacing_m, seed });
+            let as_many = points(spacing_m, seed.wrapping_add(1))?;
+            return Ok(OtherPoints {
+                points: vec![as_many, points(SQRT_2 * spacing_m, seed)?],
+                method: "an estimate: one and a half times the changes from as many other random points, and from half \
+                         as many",
+            });
+        }
     };
     let points = |deviations: f64, widths: f64| {
         points_of(Sampling::Adaptive {
@@ -429,11 +450,15 @@ fn other_patches(
     }
     let mut others = vec![points(4.0, 1.0)?, by_width];
     others.retain(|other| other.positions_m != chosen.positions_m);
-    Ok(others)
+    Ok(OtherPoints {
+        points: others,
+        method: "an estimate: one and a half times the changes from patches of other widths, where the deviation \
+                 decides and where the width does",
+    })
 }
 
 /// How far lambda is off because forces between the points do not enter it.
-fn quadrature(file: &LambdaFile, others: &[LambdaReport]) -> Option<StageAccuracy> {
+fn quadrature(file: &LambdaFile, others: &[LambdaReport], method: &str) -> Option<StageAccuracy> {
     let fine = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0)?;
     let changes = others
         .iter()
@@ -441,9 +466,7 @@ fn quadrature(file: &LambdaFile, others: &[LambdaReport]) -> Option<StageAccurac
     Some(StageAccuracy {
         estimate: 1.5 * changes.sum::<Option<f64>>()?,
         relative_to: "lambda".to_owned(),
-        method: "an estimate: one and a half times the changes from patches of other widths, where the deviation decides \
-                 and where the width does"
-            .to_owned(),
+        method: method.to_owned(),
     })
 }
 

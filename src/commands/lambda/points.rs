@@ -35,8 +35,6 @@ pub(crate) struct ForcePoints {
     pub(crate) rule: Weights,
     /// Plan area each stands for, m^2.
     pub(crate) areas: Vec<f64>,
-    /// Whether they are as dense as the surface needs them, on no grid.
-    pub(super) graded: bool,
     /// Name of the shape.
     pub(crate) shape: String,
     /// Input files.
@@ -101,7 +99,6 @@ impl ForcePoints {
             other_normals: points.marks.iter().map(|marks| marks.crease).collect(),
             rule,
             areas: points.area_m2.clone(),
-            graded: false,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
@@ -164,8 +161,6 @@ impl ForcePoints {
                     .to_owned(),
             ));
         }
-        // The patches' deviation is in it; without patches nothing is known between the points.
-        let patches = summary.accuracy.contains_key("patches");
         Ok(Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
@@ -173,7 +168,6 @@ impl ForcePoints {
             other_normals: Vec::new(),
             rule: Weights::Area,
             areas: points.weight_m2.clone(),
-            graded: patches,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
@@ -212,7 +206,7 @@ impl ForcePoints {
     }
 
     /// How far the constant of these points is from the limit of ever more of them, relative; `None`
-    /// for graded points, whose patches are compared with wider ones instead. `unwired`
+    /// for points on no grid, which are compared with others instead. `unwired`
     /// is `problem` before `wiring`.
     ///
     /// # Errors
@@ -224,11 +218,13 @@ impl ForcePoints {
         (wiring, settings): (&Wiring, &Settings),
         at: ForcesAt,
     ) -> Result<Option<f64>, RunError> {
-        if self.areas.len() != problem.points() || self.graded {
+        let Some(grid) = self.grid_places() else {
+            return Ok(None);
+        };
+        if self.areas.len() != problem.points() {
             return Ok(None);
         }
         let cells = self.fine.as_ref();
-        let grid = self.grid_places();
         if let (Some(cells), Some(on_grid)) = (cells, self.before_graded()) {
             let (of_grid, graded) = problem.split_at(on_grid);
             let fine = Some(fine_samples(cells, &graded, true));
