@@ -43,6 +43,26 @@ impl Marks {
     };
 }
 
+/// What a user should know where a body is open: through a hole in its top the height is that of its underside.
+#[must_use]
+pub fn single_sheets(marks: &[Marks]) -> Option<String> {
+    let inside = || {
+        let inner = |marks: &&Marks| !(marks.wall || marks.rim || marks.filled);
+        marks.iter().filter(inner)
+    };
+    let single = inside().filter(|marks| marks.layers == 1).count();
+    // Two are an overhang where the whole is open; at the rim of what is closed they are one by rounding.
+    let two = |marks: &&Marks| marks.layers == 2 && marks.overhang;
+    let of_bodies = inside().filter(two).count();
+    (single > 0 && of_bodies > single).then(|| {
+        format!(
+            "{single} points lie on a single sheet and {of_bodies} on a body's two: where the body has a hole, \
+             the height is that of what is seen through it (--inspect counts open edges); mend the mesh, or \
+             leave the underside out and take --holes fill"
+        )
+    })
+}
+
 /// Data common to all points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rules {
@@ -160,7 +180,9 @@ fn of_contacts(
         .windows(2)
         .filter(|pair| pair[1] - pair[0] > same_m)
         .count() as u32;
-    let layers = if heights.is_empty() { 1 } else { steps + 1 };
+    let covering = if heights.is_empty() { 0 } else { steps + 1 };
+    // In a crack, which rounding leaves, the sheet that gives the height does not cover the point.
+    let layers = covering + u32::from(!heights.iter().any(|height| same(*height)));
     let crease = contacts
         .iter()
         .filter_map(|(index, contact)| match contact {

@@ -169,6 +169,64 @@ fn factors_that_differ_are_refused_unless_they_are_meant() {
     with("scale = -1").ends(3);
 }
 
+/// The underside was taken for the top where that has a hole, and `--inspect` alone said so: lambda 29 % too small.
+#[test]
+fn regression_a_hole_in_a_body_s_top_was_passed_over_in_silence() {
+    let place = Place::new();
+    let warned = |name: &str, missing: &[[i32; 2]], sheet: bool| {
+        let mut corners = Vec::new();
+        for (i, j) in (0..16).map(|k| (k / 4, k % 4)) {
+            if !missing.contains(&[i, j]) {
+                let (x, y) = (20 * i - 40, 20 * j - 40);
+                corners.push([
+                    [x, y, 50],
+                    [x + 20, y, 50],
+                    [x + 20, y + 20, 50],
+                    [x, y + 20, 50],
+                ]);
+            }
+        }
+        if !sheet {
+            corners.push([[-40, -40, 20], [-40, 40, 20], [40, 40, 20], [40, -40, 20]]);
+            let around = [[-40, -40], [40, -40], [40, 40], [-40, 40]];
+            for k in 0..4 {
+                let [[a, b], [c, d]] = [around[k], around[(k + 1) % 4]];
+                corners.push([[a, b, 20], [c, d, 20], [c, d, 50], [a, b, 50]]);
+            }
+        }
+        let points = corners.iter().flatten();
+        let mut text: String = points.map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+        for k in 0..corners.len() {
+            let [a, b, c, d] = [1, 2, 3, 4].map(|n| 4 * k + n);
+            text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        }
+        place.write(name, &text);
+        let args = [
+            "--force", "--unit", "mm", "--format", "json", "--grid", "15x15", "--x", "-35,35",
+            "--y", "-35,35",
+        ];
+        let ran = place
+            .run(&[&["discretize", name], &args[..]].concat())
+            .ends(0);
+        let warnings = ran.json()["warnings"].to_string();
+        warnings.contains("points lie on a single sheet")
+    };
+    assert!(warned("hole.obj", &[[2, 2]], false));
+    assert!(warned(
+        "holes.obj",
+        &[[2, 2], [0, 1], [1, 1], [1, 3]],
+        false
+    ));
+    // T-junctions alone, and open sheets.
+    assert!(!warned("whole.obj", &[], false));
+    assert!(!warned("sheet.obj", &[], true));
+    assert!(!warned("torn.obj", &[[2, 2]], true));
+    place
+        .run(&["lambda", SEED, "hole.obj", "--unit", "mm", "--grid", "9x9"])
+        .ends(0)
+        .says(&["where the body has a hole"]);
+}
+
 #[test]
 fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
     let place = Place::new();

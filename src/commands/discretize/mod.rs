@@ -28,7 +28,7 @@ use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{GridRequest, ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
-use crate::shape::point_flags::Marks;
+use crate::shape::point_flags::{Marks, single_sheets};
 use crate::shape::points::Known;
 use crate::shape::surface::{ByteObserver, LARGEST_FILE, read_file};
 use crate::shape::{
@@ -555,6 +555,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
     if let (Some(reader), Some(stage)) = (&discretized.read_by, accuracy.get_mut("tessellation")) {
         stage.method = format!("{}; read by {reader}", stage.method);
     }
+    warnings.extend(single_sheets(&discretized.points.marks));
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,

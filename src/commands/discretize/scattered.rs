@@ -16,6 +16,7 @@ use crate::scene::sources::Sampling;
 use crate::shape::ShapeError;
 use crate::shape::document::ShapeDocument;
 use crate::shape::hidden::Hidden;
+use crate::shape::point_flags::single_sheets;
 use crate::shape::points::requested_grid;
 use crate::shape::scattered::adaptive::{Grading, adaptive};
 use crate::shape::scattered::poisson::poisson;
@@ -159,6 +160,7 @@ pub fn run(
     accuracy.insert("points", stage(heights_m, method));
     let hidden = Hidden::of(&surface);
     warnings.extend(hidden.and_then(|hidden| hidden.warning()));
+    warnings.extend(single_sheets(&points.marks));
     let summary = ScatteredSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
