@@ -1,4 +1,4 @@
-//! The journal of `optimize --for`: written last, shared by runs side by side, believed under its seal alone.
+//! The journal of `optimize --for`: written now and then and last, shared by runs side by side, believed under its seal alone.
 
 use std::collections::BTreeSet;
 use std::process::Stdio;
@@ -62,6 +62,39 @@ fn regression_a_full_disk_under_the_journal_took_the_result_away() {
     assert_eq!(ran.json()["status"], "done");
     assert!(!place.path("kept.json").exists());
     place.run(&["evaluate", "best.toml"]).ends(0);
+}
+
+/// A run that was killed lost every array: the journal was written at its end alone.
+#[test]
+fn regression_a_killed_run_left_no_journal() {
+    let place = place();
+    let vary = [
+        "--vary",
+        "coil.outer_diameter_mm=30:40",
+        "--vary",
+        "coil.length_mm=30:70",
+    ];
+    let long = [
+        &vary[..],
+        &["--evaluations", "100000", "--front", "front.csv"],
+    ]
+    .concat();
+    let mut child = place
+        .command(&search("kept.json", &long))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !place.path("kept.json").exists() {
+        sleep(Duration::from_millis(20));
+    }
+    assert!(child.try_wait().unwrap().is_none(), "ended by itself");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let left = arrays(&place.text("kept.json"));
+    let short = [&vary[..], &["--evaluations", "4", "--format", "json"]].concat();
+    place.run(&search("kept.json", &short)).ends(0);
+    assert!(left.len() > 3 && arrays(&place.text("kept.json")).is_superset(&left));
 }
 
 /// How a search goes on from the journal `early` where `late` takes the place of that before it writes its own.

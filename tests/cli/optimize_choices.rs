@@ -52,6 +52,57 @@ fn regression_rows_of_the_front_lacked_their_choice_and_its_variables() {
     assert!(front.iter().all(|point| point["layout"].is_string()));
 }
 
+/// The costs were those before lengths are rounded, 2e-6 beside those of the design in the row.
+#[test]
+fn regression_the_front_s_costs_were_of_other_designs_than_its_rows() {
+    let place = Place::empty();
+    place.write(
+        "array.toml",
+        "name = \"array\"\n[coil]\ninner_diameter_mm = 14\nouter_diameter_mm = 28\nlength_mm = 35\n[wire]\n\
+         diameter_mm = 0.7\n[array]\nrows = 2\ncolumns = 2\npitch_mm = 40\n[supply]\ncurrent_max_a = 3\n\
+         total_current_max_a = 7\n[limits]\narray_mass_max_kg = 0.6\n[search]\ncoil.outer_diameter_mm = [20, 36]\n\
+         coil.inner_diameter_mm = [10.0, 20]\n[workspace]\nx_mm = [-40, 40, 9]\ny_mm = [-40, 40, 9]\n\
+         z_mm = [15, 60, 10]\n",
+    );
+    place.write(
+        "dome.toml",
+        "name = \"dome\"\nprimitive = \"half-sphere\"\nradius_mm = 25\nbase_mm = 20\n[points]\n\
+         x_mm = [-25, 25, 9]\ny_mm = [-25, 25, 8]\n",
+    );
+    let mut arguments = vec!["optimize", "array.toml", "--for", "dome.toml"];
+    arguments.extend([
+        "--evaluations",
+        "8",
+        "--starts",
+        "1",
+        "--front",
+        "trade.csv",
+    ]);
+    arguments.extend(["--format", "json"]);
+    let result = place.run(&arguments).ends(0).json();
+    let values = result["values"].as_object().unwrap();
+    let front = result["study"]["front"].as_array().unwrap();
+    let mut rows = 0;
+    for (quantity, limit) in [
+        ("array_mass_kg", "array_mass_kg"),
+        ("array_power_w", "array_power_w"),
+    ] {
+        let best = front.iter().find(|point| {
+            point["quantity"] == quantity && point["values"].as_object() == Some(values)
+        });
+        let stated = result["limits"][limit]["value"].as_f64();
+        if let (Some(point), Some(stated)) = (best, stated) {
+            let cost = point["value"].as_f64().unwrap();
+            assert!(
+                (cost / stated - 1.0).abs() < 1e-12,
+                "{quantity}: {cost} {stated}"
+            );
+            rows += 1;
+        }
+    }
+    assert!(rows > 0, "{result}");
+}
+
 /// A constant that is 0 was taken for an array that renders nothing.
 #[test]
 fn regression_an_array_without_a_maxmin_was_said_to_render_nothing() {

@@ -293,7 +293,8 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
             let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
             others.all(Bounded::is_met)
         });
-        let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
+        let made = problem.made(&sample.x);
+        let costs = TRADED.map(|(_, name)| traded(problem, &made, &physical, name));
         let [Some(mass), Some(power), Some(settling)] = costs else {
             return None;
         };
@@ -305,7 +306,7 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
             costs: [mass, power, settling],
             met: bounds.iter().all(Bounded::is_met),
             met_but,
-            values: problem.space.named(&problem.made(&sample.x)),
+            values: problem.space.named(&made),
             source,
             x: sample.x.clone(),
             full: problem.is_known_fully(&sample.x),

@@ -61,8 +61,6 @@ fn coils(object: &CalibratedObject) -> Value {
             "bore": object.section.inner_radius_m * 1e3,
             "core": object.section.core_radius_m.map(|radius_m| radius_m * 1e3),
             "current": coil.current_a,
-            "min": coil.min_a,
-            "max": coil.max_a,
         })
     };
     Value::Array(object.coils().iter().map(one).collect())

@@ -1,6 +1,9 @@
 //! `optimize --for`: arguments, files and the summary.
 
 use std::collections::BTreeMap;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
 use clap::Args;
 
@@ -103,6 +106,10 @@ pub struct Shared<'a> {
     pub tolerance: Option<f64>,
 }
 
+/// Pauses between what is written of the journal during a search: each is twice the one before.
+const SOONEST_KEPT: Duration = Duration::from_secs(1);
+const LATEST_KEPT: Duration = Duration::from_secs(20);
+
 /// The files of a search.
 struct Outputs<'a> {
     /// The first line of what is made of the design.
@@ -156,7 +163,9 @@ impl ArrayFlags {
             text: &text,
             path,
         };
-        let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
+        let ended = self.keeping(&outputs, &physics, || {
+            optimize_array(&source, &shapes, inputs, &request, &physics, &bar)
+        });
         let arrays = physics.journal();
         let seconds = bar.take_seconds();
         drop(physics);
@@ -184,6 +193,32 @@ impl ArrayFlags {
         let kept =
             kept.map_err(|wrong| Failure::Input(format!("{}: {wrong}", shown_path(path))))?;
         Ok(kept.arrays)
+    }
+
+    /// What `search` gives, while the journal is written now and then, so that a run that is killed loses little.
+    fn keeping<T>(
+        &self,
+        outputs: &Outputs<'_>,
+        physics: &ArrayPhysics<'_>,
+        search: impl FnOnce() -> T,
+    ) -> T {
+        let Some(FileArgument::Path(path)) = &self.journal else {
+            return search();
+        };
+        thread::scope(|scope| {
+            let (ended, until) = mpsc::channel::<()>();
+            scope.spawn(move || {
+                let mut pause = SOONEST_KEPT;
+                while until.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
+                    pause = LATEST_KEPT.min(2 * pause);
+                    // What cannot be written is reported in the end.
+                    let _ = journal::add(path, &outputs.mark, &outputs.marked, &physics.journal());
+                }
+            });
+            let found = search();
+            drop(ended);
+            found
+        })
     }
 
     /// Writes the journal; returns where the summary goes.

@@ -61,7 +61,8 @@ function paintScene(pen, scene, view, look) {
   }
   shapes.sort((a, b) => b.depth - a.depth);
   // The coils stand below every point, so they are behind as long as one looks from above.
-  for (const coil of coils) paintCoil(pen, coil, view);
+  const most = Math.max(...coils.map((coil) => Math.abs(coil.current)));
+  for (const coil of coils) paintCoil(pen, coil, most > 0 ? Math.abs(coil.current) / most : 0, view);
   paintAxes(pen, scene, view);
   pen.lineWidth = 0.7;
   for (const { face, fill } of shapes) {
@@ -90,8 +91,7 @@ function paintScene(pen, scene, view, look) {
   return spots;
 }
 
-function paintCoil(pen, coil, view) {
-  const part = coil.max > 0 ? coil.current / coil.max : 0;
+function paintCoil(pen, coil, part, view) {
   const ring = (radius) => {
     for (let k = 0; k <= 40; k += 1) {
       const angle = (2 * Math.PI * k) / 40;
@@ -106,7 +106,7 @@ function paintCoil(pen, coil, view) {
   pen.beginPath();
   ring(coil.radius);
   ring(coil.bore);
-  pen.globalAlpha = 0.1 + 0.6 * Math.min(1, Math.abs(part));
+  pen.globalAlpha = 0.1 + 0.6 * part;
   pen.fillStyle = style("--c1");
   pen.fill("evenodd");
   pen.globalAlpha = 1;
