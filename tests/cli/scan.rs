@@ -639,7 +639,13 @@ fn the_object_is_as_its_schema_says() {
 }
 
 /// A scan of what `truth` says, at 1.3 A in its only coil, with noise.
-fn scan_of(place: &Place, truth: &str, points_m: &[[f64; 3]], noise_t: f64, seed: u64) -> String {
+pub fn scan_of(
+    place: &Place,
+    truth: &str,
+    points_m: &[[f64; 3]],
+    noise_t: f64,
+    seed: u64,
+) -> String {
     let mut table = "x_m,y_m,z_m\n".to_owned();
     for [x, y, z] in points_m {
         table.push_str(&format!("{x},{y},{z}\n"));
@@ -668,7 +674,7 @@ fn scan_of(place: &Place, truth: &str, points_m: &[[f64; 3]], noise_t: f64, seed
 }
 
 /// `design` with one coil.
-fn alone(design: &str) -> String {
+pub fn alone(design: &str) -> String {
     design
         .replace("rows = 3", "rows = 1")
         .replace("columns = 3", "columns = 1")

@@ -1,10 +1,9 @@
 //! Scales, background and the sensor's frame, fitted to a scan all at once.
 //!
-//! Gauss-Newton steps: the scales and the background are linear, the frame is linearised by central
-//! differences of the computed field at every step. A step that leaves more is halved, and so is one that moves
+//! Gauss-Newton steps: the scales and the background are linear, the frame is linearised at every step. A step that leaves more is halved, and so is one that moves
 //! the scan away from the array: far away every field fits as well as none, and no step changes anything.
 
-use super::model::{Model, Pose, STEP_M};
+use super::model::{Model, Pose};
 use crate::RunError;
 use crate::bundle::scan::{Measured, Scan};
 use crate::numerics::least_squares::{self, Solution};
@@ -280,22 +279,13 @@ impl Task<'_> {
 
     /// Change by a step of every parameter, weighted.
     fn columns(&self, state: &State, steps: &[f64]) -> Result<Vec<Vec<f64>>, RunError> {
-        let pose = self.pose(&state.values);
-        let places = self.model.places(pose)?;
-        let turn_rad = STEP_M / self.model.extent_m().max(1e-2);
-        let moved = |change: &dyn Fn(&mut Pose, f64), step: f64| -> Result<Vec<f64>, RunError> {
-            let [up, down] = [step, -step].map(|step| {
-                let mut pose = pose;
-                change(&mut pose, step);
-                let contributions = self.model.contributions(&places, pose, self.progress)?;
-                Ok::<_, RunError>(self.scaled(&state.values, &contributions))
-            });
-            let (up, down) = (up?, down?);
-            Ok(up
-                .iter()
-                .zip(&down)
-                .map(|(u, d)| (u - d) / (2.0 * step))
-                .collect())
+        let of_frame = |p: &Parameter| matches!(p, Parameter::Shift(_) | Parameter::Angle(_));
+        let slopes = if self.parameters.iter().any(of_frame) {
+            let pose = self.pose(&state.values);
+            let places = self.model.places(pose)?;
+            self.model.slopes(&places, pose, self.progress)?
+        } else {
+            <[Vec<f64>; 6]>::default()
         };
         let columns = self.parameters.iter().zip(steps).map(|(parameter, step)| {
             let mut column = match *parameter {
@@ -307,15 +297,15 @@ impl Task<'_> {
                     self.of_component(i).for_each(|at| column[at] = 1.0);
                     column
                 }
-                Parameter::Shift(i) => moved(&|pose, step| pose.shift_m[i] += step, STEP_M)?,
-                Parameter::Angle(i) => moved(&|pose, step| pose.angles_rad[i] += step, turn_rad)?,
+                Parameter::Shift(i) => self.scaled(&state.values, &slopes[i]),
+                Parameter::Angle(i) => self.scaled(&state.values, &slopes[3 + i]),
             };
             for (value, weight) in column.iter_mut().zip(self.weights) {
                 *value *= weight * step;
             }
-            Ok(column)
+            column
         });
-        columns.collect()
+        Ok(columns.collect())
     }
 
     /// The state after the step, or after part of it; `None` where none leaves less.

@@ -1,5 +1,7 @@
 //! The predicted scan: the field of the driven coils where the sensor was.
 
+use std::f64::consts::FRAC_PI_2;
+
 use rayon::prelude::*;
 
 use super::units::reach_m;
@@ -14,8 +16,8 @@ use crate::scene::steel::Solved;
 
 /// Rows handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 256;
-/// Steps of differences along the sensor's shift, m.
-pub(super) const STEP_M: f64 = 1e-4;
+/// Steps of the gradient's differences, m.
+const STEP_M: f64 = 1e-4;
 
 type Matrix = [[f64; 3]; 3];
 
@@ -37,6 +39,19 @@ impl Pose {
             [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
             [-sy, sx * cy, cx * cy],
         ]
+    }
+
+    /// Derivative of the matrix by an angle, in whose sine and cosine it is linear.
+    fn slope_of_matrix(self, angle: usize) -> Matrix {
+        let quarter = |sense: f64| {
+            let mut pose = self;
+            pose.angles_rad[angle] += sense * FRAC_PI_2;
+            pose.matrix()
+        };
+        let mut slope = Matrix::default();
+        add(&mut slope, 0.5, &quarter(1.0));
+        add(&mut slope, -0.5, &quarter(-1.0));
+        slope
     }
 }
 
@@ -68,10 +83,14 @@ impl<'a> Model<'a> {
         }
     }
 
+    fn offset_m(&self, p: &[f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| p[axis] - self.middle_m[axis])
+    }
+
     /// How far the scan reaches from its middle, m.
-    pub(super) fn extent_m(&self) -> f64 {
+    fn extent_m(&self) -> f64 {
         let distance = |p: &[f64; 3]| {
-            let [x, y, z]: [f64; 3] = std::array::from_fn(|axis| p[axis] - self.middle_m[axis]);
+            let [x, y, z] = self.offset_m(p);
             x.hypot(y).hypot(z)
         };
         self.scan
@@ -90,9 +109,9 @@ impl<'a> Model<'a> {
     fn positions_m(&self, pose: Pose) -> Vec<[f64; 3]> {
         let turn = pose.matrix();
         let placed = |p: &[f64; 3]| {
-            let from: [f64; 3] = std::array::from_fn(|axis| p[axis] - self.middle_m[axis]);
+            let from_m = self.offset_m(p);
             std::array::from_fn(|axis| {
-                self.middle_m[axis] + dot(turn[axis], from) + pose.shift_m[axis]
+                self.middle_m[axis] + dot(turn[axis], from_m) + pose.shift_m[axis]
             })
         };
         // Unturned positions stay as they were given, to the last bit.
@@ -121,8 +140,79 @@ impl<'a> Model<'a> {
         pose: Pose,
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
-        let positions_m = self.positions_m(pose);
+        let fields = self.driven_fields(places, &self.positions_m(pose), progress)?;
         let turn = pose.matrix();
+        let mut values = Vec::with_capacity(fields.len() * self.scan.quantities.len());
+        for ((_, current_a), field) in self.currents_a().zip(&fields) {
+            values.extend(self.measured(current_a, &turned(field, &turn)));
+        }
+        Ok(values)
+    }
+
+    /// Derivatives of [`Self::contributions`] by the three shifts, by m, and then by the three angles, by rad.
+    ///
+    /// Those of the field are exact, by its gradient: a turn that changes nothing is told from one that changes little.
+    /// Those of the gradient are fourth-order differences.
+    ///
+    /// # Errors
+    /// As of [`Self::contributions`].
+    pub(super) fn slopes(
+        &self,
+        places: &FieldAt,
+        pose: Pose,
+        progress: &dyn Progress,
+    ) -> Result<[Vec<f64>; 6], RunError> {
+        let positions_m = self.positions_m(pose);
+        let fields = self.driven_fields(places, &positions_m, progress)?;
+        let gradient_slopes = self.gradient_slopes(places, &positions_m, progress)?;
+        let turn = pose.matrix();
+        let turns = [0, 1, 2].map(|angle| pose.slope_of_matrix(angle));
+        let mut slopes: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::new());
+        for (pair, ((row, current_a), field)) in self.currents_a().zip(&fields).enumerate() {
+            let from_m = self.offset_m(&self.scan.positions_m[row]);
+            for (k, slope) in slopes.iter_mut().enumerate() {
+                let motion = match k {
+                    0..3 => Motion {
+                        step: std::array::from_fn(|axis| f64::from(u8::from(axis == k))),
+                        turn: Matrix::default(),
+                    },
+                    _ => Motion {
+                        step: turns[k - 3].map(|row| dot(row, from_m)),
+                        turn: turns[k - 3],
+                    },
+                };
+                let change = motion.changes(field, gradient_slopes.get(pair), &turn);
+                slope.extend(self.measured(current_a, &change));
+            }
+        }
+        Ok(slopes)
+    }
+
+    /// Row and current, A, of every contribution.
+    fn currents_a(&self) -> impl Iterator<Item = (usize, f64)> {
+        let rows = self.scan.currents_a.iter().enumerate();
+        rows.flat_map(|(row, currents)| {
+            currents.iter().map(move |(_, current_a)| (row, *current_a))
+        })
+    }
+
+    /// What a sensor that sees `seen` at 1 A measures, T or T/m.
+    fn measured(&self, current_a: f64, seen: &CartesianField) -> impl Iterator<Item = f64> {
+        let of = |quantity: &Measured| match *quantity {
+            Measured::Field(i) => seen.field_t_per_a[i],
+            Measured::Gradient(i, j) => seen.gradient_t_per_m_per_a[i][j],
+        };
+        self.scan.quantities.iter().map(move |q| current_a * of(q))
+    }
+
+    /// The field of the coil of every contribution.
+    fn driven_fields(
+        &self,
+        places: &FieldAt,
+        positions_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<CartesianField>, RunError> {
+        let coils = self.scene.coils.len();
         let portions = positions_m
             .par_chunks(PORTION)
             .zip(self.scan.currents_a.par_chunks(PORTION))
@@ -133,22 +223,43 @@ impl<'a> Model<'a> {
                     currents[row].iter().any(|(driven, _)| *driven == coil)
                 };
                 let fields = places.driven_fields(points, portion * PORTION + 1, &driven)?;
-                let coils = self.scene.coils.len();
-                let mut values = Vec::new();
-                for (row, currents) in currents.iter().enumerate() {
-                    for (coil, current_a) in currents {
-                        let seen = turned(&fields[row * coils + coil], &turn);
-                        let of = |quantity: &Measured| match *quantity {
-                            Measured::Field(i) => seen.field_t_per_a[i],
-                            Measured::Gradient(i, j) => seen.gradient_t_per_m_per_a[i][j],
-                        };
-                        values.extend(self.scan.quantities.iter().map(|q| current_a * of(q)));
-                    }
-                }
-                Ok(values)
+                let rows = currents.iter().enumerate();
+                let of_row = |(row, currents): (usize, &'a Vec<(usize, f64)>)| {
+                    let fields = &fields;
+                    currents
+                        .iter()
+                        .map(move |(coil, _)| fields[row * coils + coil])
+                };
+                Ok(rows.flat_map(of_row).collect())
             })
-            .collect::<Result<Vec<_>, RunError>>()?;
+            .collect::<Result<Vec<Vec<_>>, RunError>>()?;
         Ok(portions.concat())
+    }
+
+    /// Derivatives of every contribution's gradient along x, y and z, T/m^2/A; none where no gradient is measured.
+    fn gradient_slopes(
+        &self,
+        places: &FieldAt,
+        positions_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[Matrix; 3]>, RunError> {
+        let gradient = |measured: &Measured| matches!(measured, Measured::Gradient(..));
+        if !self.scan.quantities.iter().any(gradient) {
+            return Ok(Vec::new());
+        }
+        let mut slopes = vec![[Matrix::default(); 3]; self.pairs.len()];
+        for axis in 0..3 {
+            for (steps, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
+                let mut moved_m = positions_m.to_vec();
+                moved_m.iter_mut().for_each(|p| p[axis] += steps * STEP_M);
+                let fields = self.driven_fields(places, &moved_m, progress)?;
+                for (slope, field) in slopes.iter_mut().zip(&fields) {
+                    let share = weight / (12.0 * STEP_M);
+                    add(&mut slope[axis], share, &field.gradient_t_per_m_per_a);
+                }
+            }
+        }
+        Ok(slopes)
     }
 
     /// The contributions summed with a scale for each coil, [row, quantity].
@@ -165,15 +276,61 @@ impl<'a> Model<'a> {
     }
 }
 
+/// A change of the sensor's place, by m or rad, and of its axes.
+struct Motion {
+    step: [f64; 3],
+    turn: Matrix,
+}
+
+impl Motion {
+    /// How what a sensor turned by `turn` sees changes:
+    /// d(R' B) = dR' B + R' G dp and d(R' G R) = dR' G R + R' G dR + R' (sum_k dG/dx_k dp_k) R.
+    fn changes(
+        &self,
+        field: &CartesianField,
+        gradient_slopes: Option<&[Matrix; 3]>,
+        turn: &Matrix,
+    ) -> CartesianField {
+        let gradient = &field.gradient_t_per_m_per_a;
+        let mut moved = CartesianField {
+            field_t_per_a: gradient.map(|row| dot(row, self.step)),
+            ..CartesianField::default()
+        };
+        for (slope, step) in gradient_slopes.into_iter().flatten().zip(self.step) {
+            add(&mut moved.gradient_t_per_m_per_a, step, slope);
+        }
+        let mut change = turned(&moved, turn);
+        for (i, by_place) in change.field_t_per_a.iter_mut().enumerate() {
+            *by_place += dot(column(&self.turn, i), field.field_t_per_a);
+        }
+        for (left, right) in [(&self.turn, turn), (turn, &self.turn)] {
+            let by_axes = between(left, gradient, right);
+            add(&mut change.gradient_t_per_m_per_a, 1.0, &by_axes);
+        }
+        change
+    }
+}
+
 /// As a sensor turned by `turn` sees it: R' B, R' G R.
 fn turned(field: &CartesianField, turn: &Matrix) -> CartesianField {
-    let column = |j: usize| [turn[0][j], turn[1][j], turn[2][j]];
-    let g = &field.gradient_t_per_m_per_a;
-    let g_r: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| dot(g[i], column(j))));
     CartesianField {
-        field_t_per_a: std::array::from_fn(|i| dot(column(i), field.field_t_per_a)),
-        gradient_t_per_m_per_a: std::array::from_fn(|i| {
-            std::array::from_fn(|j| dot(column(i), [g_r[0][j], g_r[1][j], g_r[2][j]]))
-        }),
+        field_t_per_a: std::array::from_fn(|i| dot(column(turn, i), field.field_t_per_a)),
+        gradient_t_per_m_per_a: between(turn, &field.gradient_t_per_m_per_a, turn),
     }
+}
+
+fn column(matrix: &Matrix, j: usize) -> [f64; 3] {
+    [matrix[0][j], matrix[1][j], matrix[2][j]]
+}
+
+/// The transpose of `left`, times `matrix`, times `right`.
+fn between(left: &Matrix, matrix: &Matrix, right: &Matrix) -> Matrix {
+    let by_right: Matrix =
+        std::array::from_fn(|i| std::array::from_fn(|j| dot(matrix[i], column(right, j))));
+    std::array::from_fn(|i| std::array::from_fn(|j| dot(column(left, i), column(&by_right, j))))
+}
+
+fn add(sum: &mut Matrix, share: f64, term: &Matrix) {
+    let terms = sum.iter_mut().flatten().zip(term.iter().flatten());
+    terms.for_each(|(sum, term)| *sum += share * term);
 }
