@@ -22,6 +22,7 @@ mod optimize_choices;
 mod optimize_limits;
 mod placement;
 mod scan;
+mod scan_fit;
 mod scan_input;
 mod screen;
 mod shards;

@@ -315,16 +315,8 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = whole(&chosen)?;
-    report.add_quadrature(if others.points.is_empty() {
-        off_grid(&report.file, &grid)
-    } else {
-        let files = others
-            .points
-            .iter()
-            .map(|points| solve_with(points, &plain));
-        let files = files.collect::<Result<Vec<_>, RunError>>()?;
-        quadrature(&report.file, &files, others.method)
-    });
+    let quadrature = others.quadrature(&report.file, &grid, |points| solve_with(points, &plain))?;
+    report.add_quadrature(quadrature);
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
 }
@@ -457,17 +449,32 @@ fn other_points(
     })
 }
 
-/// How far lambda is off because forces between the points do not enter it.
-fn quadrature(file: &LambdaFile, others: &[LambdaReport], method: &str) -> Option<StageAccuracy> {
-    let fine = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0)?;
-    let changes = others
-        .iter()
-        .map(|other| Some((other.file.lambda_n_per_m? / fine - 1.0).abs()));
-    Some(StageAccuracy {
-        estimate: 1.5 * changes.sum::<Option<f64>>()?,
-        relative_to: "lambda".to_owned(),
-        method: method.to_owned(),
-    })
+impl OtherPoints {
+    /// How far lambda of `file` is off because forces between the points do not enter it; `solve` gives that of others.
+    fn quadrature(
+        &self,
+        file: &LambdaFile,
+        grid: &LambdaFile,
+        solve: impl Fn(&ForcePoints) -> Result<LambdaReport, RunError>,
+    ) -> Result<Option<StageAccuracy>, RunError> {
+        if self.points.is_empty() {
+            return Ok(off_grid(file, grid));
+        }
+        let mut changes = Some(0.0);
+        let fine = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0);
+        for points in &self.points {
+            let other = solve(points)?.file.lambda_n_per_m;
+            let change = fine
+                .zip(other)
+                .map(|(fine, other)| (other / fine - 1.0).abs());
+            changes = changes.zip(change).map(|(sum, change)| sum + change);
+        }
+        Ok(changes.map(|changes| StageAccuracy {
+            estimate: 1.5 * changes,
+            relative_to: "lambda".to_owned(),
+            method: self.method.to_owned(),
+        }))
+    }
 }
 
 /// The same where no coarser points are to be compared with: from the grid's, and what these are off by.
