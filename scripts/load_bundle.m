@@ -226,7 +226,7 @@ function [currents, force, answers] = feedback(map, points_m)
     answers = repmat({'outside'}, count, 1);
     axes_m = {map.x_m, map.y_m, map.z_m};
     for p = 1:count
-        if ~all(arrayfun(@(k) axes_m{k}(1) <= points_m(p, k) && points_m(p, k) <= axes_m{k}(end), 1:3))
+        if any(arrayfun(@(k) isempty(stencil(axes_m{k}, points_m(p, k))), 1:3))
             continue
         end
         if vector

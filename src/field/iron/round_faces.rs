@@ -154,23 +154,26 @@ impl Cell {
         let step = TAU / f64::from(steps);
         for k in 0..steps {
             // Off the quarters, so that a corner lies within.
-            let (mut low, mut high) = ((f64::from(k) + 0.37) * step, (f64::from(k) + 1.37) * step);
-            let (first, last) = (self.border(low).1, self.border(high).1);
-            if first == last {
-                continue;
-            }
-            while high - low > 1e-14 * TAU {
-                let middle = 0.5 * (low + high);
-                if middle == low || middle == high {
-                    break;
+            let (mut low, end) = ((f64::from(k) + 0.37) * step, (f64::from(k) + 1.37) * step);
+            let (mut first, last) = (self.border(low).1, self.border(end).1);
+            // Of a long narrow face the short side lies between two that are sampled.
+            while first != last {
+                let mut high = end;
+                while high - low > 1e-14 * TAU {
+                    let middle = 0.5 * (low + high);
+                    if middle == low || middle == high {
+                        break;
+                    }
+                    if self.border(middle).1 == first {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
                 }
-                if self.border(middle).1 == first {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
+                out.push(high % TAU);
+                low = high;
+                first = self.border(high).1;
             }
-            out.push(high % TAU);
         }
         out.sort_by(f64::total_cmp);
         out.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
@@ -227,5 +230,30 @@ impl Cell {
             )
         };
         angles.windows(2).map(part).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beyond 20 m the short side of a face 0.15 m wide lay between two sampled angles: a corner of it was 4e11 km away, and
+    /// its panels were halved until the stack ended.
+    #[test]
+    fn regression_the_short_side_of_a_long_face_was_passed_over() {
+        let site = |x: f64| Site {
+            at_m: [x, 0.0],
+            radius_m: 0.019,
+        };
+        for long_m in [0.15, 12.0, 30.0, 1e4] {
+            let corners = [[-0.075, -0.5 * long_m], [0.075, 0.5 * long_m]];
+            let rim = Rim::Rectangle(corners, [true; 4]);
+            let cell = Cell::new(rim, &[site(-0.025), site(0.025)], 1);
+            for pair in cell.angles().windows(2) {
+                let inside = [0.1, 0.5, 0.9].map(|share| pair[0] + share * (pair[1] - pair[0]));
+                let [first, middle, last] = inside.map(|angle| cell.border(angle).1);
+                assert!(first == middle && last == middle, "{long_m} {pair:?}");
+            }
+        }
     }
 }
