@@ -12,7 +12,6 @@ use super::message_text::{number, twelve_digits};
 use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
 use super::values::OneOrMany;
-use fluxform_base::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C};
 use fluxform_numerics::axis::Axis;
 
 /// Most map values, coils times workspace nodes: 8 GB of doubles.
@@ -80,24 +79,6 @@ fn wire(wire: &WireDraft, sink: &Sink) {
             sink,
             "wire.conductor_diameter_mm",
             &wire.conductor.span,
-            message,
-            help,
-        );
-    }
-    let rise_k = wire.temperature_c.value - REFERENCE_TEMPERATURE_C;
-    let factor = 1.0 + COPPER_TEMPERATURE_COEFFICIENT_PER_K * rise_k;
-    if factor <= 0.0 {
-        let coldest = REFERENCE_TEMPERATURE_C - 1.0 / COPPER_TEMPERATURE_COEFFICIENT_PER_K;
-        let message = format!(
-            "at {} C the linear law of copper gives no positive resistivity ({} of that at 20 C)",
-            number(wire.temperature_c.value),
-            number((factor * 1e4).round() / 1e4)
-        );
-        let help = format!("stay above {coldest:.2} C");
-        error(
-            sink,
-            "wire.temperature_c",
-            &wire.temperature_c.span,
             message,
             help,
         );

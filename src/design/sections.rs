@@ -17,10 +17,8 @@ use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 use fluxform_numerics::axis::Axis;
 
-/// Absolute zero, C.
-const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// By its linear law copper has no resistivity at -234.45 C.
-const COLDEST_COPPER_C: f64 = -234.0;
+const COLDEST_COPPER_C: f64 = -234.4;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -73,7 +71,7 @@ pub struct WireDraft {
 }
 
 pub fn wire(mut s: Section<'_>) -> WireDraft {
-    let temperature = Rule::any("C").bound(Bound::AtLeast(ABSOLUTE_ZERO_C));
+    let temperature = Rule::any("C").bound(Bound::AtLeast(COLDEST_COPPER_C));
     let diameter = s.required("diameter_mm", &WIRE_MM.positive());
     let conductor = s.number("conductor_diameter_mm", &WIRE_MM.positive());
     let draft = WireDraft {

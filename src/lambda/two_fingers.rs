@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::random::Random;
-use fluxform_numerics::vec3::dot;
+use fluxform_numerics::vec3::{dot, minus, norm};
 
 use super::feedback::FeedbackError;
 use super::problem::{ForceProblem, Settings};
@@ -32,6 +32,8 @@ const TRIALS: usize = 200;
 pub const GIVEN: f64 = 1e-3;
 /// Price of power, relative to the forces' square over resistance: below what `GIVEN` sees.
 const PRICE: f64 = 1e-9;
+/// The axis of magnets without a moment.
+const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
 /// The pairs are the same in every run.
 const SEED: u64 = 0x2f19;
 
@@ -70,7 +72,7 @@ pub fn between_magnets_n(moment_a_m2: [f64; 3], from_first_m: [f64; 3]) -> [f64;
     })
 }
 
-/// The magnets of both fingers, alike and upright.
+/// The magnets of both fingers, alike and parallel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FingerMagnet {
     /// Moment, A m^2.
@@ -82,10 +84,24 @@ pub struct FingerMagnet {
 }
 
 impl FingerMagnet {
+    /// Distances of two of them, `apart_m` from centre to centre, along their axis and across it, m.
+    #[must_use]
+    pub fn along_and_across_m(&self, apart_m: [f64; 3]) -> [f64; 2] {
+        let size_a_m2 = norm(self.moment_a_m2);
+        let axis = match size_a_m2 > 0.0 {
+            true => self.moment_a_m2.map(|part| part / size_a_m2),
+            false => UPRIGHT,
+        };
+        let along_m = dot(axis, apart_m);
+        let across_m = minus(apart_m, axis.map(|part| along_m * part));
+        [along_m.abs(), norm(across_m)]
+    }
+
     /// Whether two of them, `apart_m` from centre to centre, would lie in each other.
     #[must_use]
-    pub fn overlaps(&self, [x, y, z]: [f64; 3]) -> bool {
-        x.hypot(y) < self.diameter_m && z.abs() < self.length_m
+    pub fn overlaps(&self, apart_m: [f64; 3]) -> bool {
+        let [along_m, across_m] = self.along_and_across_m(apart_m);
+        across_m < self.diameter_m && along_m < self.length_m
     }
 
     /// Below this distance they always do, m.

@@ -158,6 +158,10 @@ fn a_shape_is_a_surface_or_a_primitive() {
             "name = \"a\"\nprimitive = \"flat\"\n[points]\nx_mm = [-50, 50, 100000]\ny_mm = [-50, 50, 100000]\n",
             "s.toml:4:8: error: points.x_mm: 100000 x 100000 points are more than 100000000 (ask for fewer samples)",
         ),
+        (
+            "name = \"a\"\nprimitive = \"flat\"\n[points]\nx_mm = [-50, 50, 11]\ny_mm = [-50, 50, 1e9]\n",
+            "s.toml:5:8: error: points.y_mm: 11 x 1000000000 points are more than 100000000 (ask for fewer samples)",
+        ),
     ];
     for (text, expected) in cases {
         assert_eq!(refused(text), [expected], "of\n{text}");

@@ -87,3 +87,21 @@ fn both_get_their_force_if_the_limits_leave_it_after_the_magnets_own() {
     assert_eq!([torn.upward_share, torn.vector_share], [1.0, 0.0]);
     assert_eq!(pairs(1.3, [0.0; 3], [0.3, 0.4]).pairs, 0);
 }
+
+/// Tilted magnets were taken for upright ones: 20 mm of 40 mm lay in each other unnoticed, and 5 mm apart was refused.
+#[test]
+fn regression_magnets_that_lie_overlapped_as_if_they_stood() {
+    let magnet = |moment_a_m2| FingerMagnet {
+        moment_a_m2,
+        diameter_m: 0.01,
+        length_m: 0.04,
+    };
+    let (stands, lies) = (magnet([0.0, 0.0, 0.5]), magnet([0.0, -0.5, 0.0]));
+    let above = [0.0, 0.0, 0.015];
+    let behind = [0.0, 0.02, 0.0];
+    assert!(stands.overlaps(above) && !stands.overlaps(behind));
+    assert!(lies.overlaps(behind) && !lies.overlaps(above));
+    let turned = magnet([0.3, 0.0, 0.4]);
+    let [along, across] = turned.along_and_across_m([0.03, 0.0, 0.04]);
+    assert!((along - 0.05).abs() < 1e-15 && across < 1e-15);
+}

@@ -228,7 +228,7 @@ fn magnets_that_overlap_are_refused_with_their_time() {
     let message = replayed(&opened, &trajectory).unwrap_err();
     assert!(
         message
-            .contains("at 0.01 s the two fingers are 1.414 mm apart sideways and 1 mm in height"),
+            .contains("at 0.01 s the two fingers are 1.414 mm apart across their magnets' axis and 1 mm along it"),
         "{message}"
     );
 }

@@ -42,14 +42,14 @@ pub(super) fn touching(trajectory: &Trajectory, magnet: &FingerMagnet) -> Option
     let apart = pairs.map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k]));
     let mut at = apart.zip(&trajectory.t_s);
     at.find(|(apart_m, _)| magnet.overlaps(*apart_m))
-        .map(|([x, y, z], t_s)| {
-            let (aside, above) = (x.hypot(y), z.abs());
+        .map(|(apart_m, t_s)| {
+            let [along_m, across_m] = magnet.along_and_across_m(apart_m);
             let mm = |length_m: f64| (length_m * 1e6).round() / 1e3;
             format!(
-                "at {t_s} s the two fingers are {} mm apart sideways and {} mm in height, where their magnets, {} mm \
-                 wide and {} mm long, overlap",
-                mm(aside),
-                mm(above),
+                "at {t_s} s the two fingers are {} mm apart across their magnets' axis and {} mm along it, where these, \
+                 {} mm wide and {} mm long, overlap",
+                mm(across_m),
+                mm(along_m),
                 mm(magnet.diameter_m),
                 mm(magnet.length_m)
             )

@@ -447,7 +447,12 @@ fn points(mut s: Section<'_>) -> Points {
             "{} x {} points are more than {POINTS_MAX}",
             x.samples, y.samples
         );
-        s.fault("x_mm", message, "ask for fewer samples");
+        let finer = if x.samples < y.samples {
+            "y_mm"
+        } else {
+            "x_mm"
+        };
+        s.fault(finer, message, "ask for fewer samples");
     }
     s.finish();
     let grid = grid.map(|axes| {

@@ -227,7 +227,7 @@ fn windings() -> Vec<Case> {
             || {
                 refused(
                     design("diameter_mm = 0.7\ntemperature_c = -273.15", ""),
-                    &["no positive resistivity"],
+                    &["at least -234.4 C"],
                 )
             },
         ),
