@@ -1,7 +1,8 @@
 //! Scales, background and the sensor's frame, fitted to a scan all at once.
 //!
-//! Gauss-Newton steps: the scales and the background are linear, the frame is linearised at every step. A step that leaves more is halved, and so is one that moves
-//! the scan away from the array: far away every field fits as well as none, and no step changes anything.
+//! Gauss-Newton steps: the scales and the background are linear, the frame is linearised at every step. A step that
+//! leaves more is halved, and so is one that moves the scan away from the array: far away every field fits as well as
+//! none, and no step changes anything.
 
 use super::model::{Model, Pose};
 use crate::RunError;
