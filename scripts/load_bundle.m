@@ -59,13 +59,13 @@ function force = force_per_ampere(map, points_m)
 % Upward force on the magnet's centre, N/A: the sum over i of m_i dB_i/dz.
     m = map.moment_a_m2;
     force = zeros(size(points_m, 1), numel(map.current_max_a));
+    near = around(map, points_m);
     if m(1) == 0 && m(2) == 0
-        found = m(3) * interpolate(map, map.gz_t_per_m_per_a, points_m);
+        found = m(3) * interpolate(near, map.gz_t_per_m_per_a, 1, 1);
     else
         found = 0;
         for i = 1:3
-            part = map.gradient_t_per_m_per_a(:, :, :, :, i, 3);
-            found = found + m(i) * interpolate(map, part, points_m);
+            found = found + m(i) * interpolate(near, map.gradient_t_per_m_per_a, i, 3);
         end
     end
     force(:, map.coil + 1) = found.';
@@ -79,14 +79,14 @@ function force = force_vectors_per_ampere(map, points_m)
     m = map.moment_a_m2;
     force = zeros(size(points_m, 1), numel(map.current_max_a), 3);
     maps = {map.gx_t_per_m_per_a, map.gy_t_per_m_per_a, map.gz_t_per_m_per_a};
+    near = around(map, points_m);
     for axis = 1:3
         if m(1) == 0 && m(2) == 0
-            found = m(3) * interpolate(map, maps{axis}, points_m);
+            found = m(3) * interpolate(near, maps{axis}, 1, 1);
         else
             found = 0;                            % F = grad(m . B): all of the gradient counts
             for i = 1:3
-                part = map.gradient_t_per_m_per_a(:, :, :, :, i, axis);
-                found = found + m(i) * interpolate(map, part, points_m);
+                found = found + m(i) * interpolate(near, map.gradient_t_per_m_per_a, i, axis);
             end
         end
         force(:, map.coil + 1, axis) = found.';
@@ -111,22 +111,30 @@ function force = passive_force(map, points_m)
     force = zeros(size(points_m, 1), 1);
     if isfield(map, 'passive_force_n')
         values = reshape(map.passive_force_n, [1, size(map.passive_force_n)]);
-        force(:) = interpolate(map, values, points_m);
+        force(:) = interpolate(around(map, points_m), values, 1, 1);
     end
 end
 
-function found = interpolate(map, values, points_m)
-% Values [map, z, y, x] at points: tricubic Lagrange, one row a map, one column a point; 0 outside.
-    found = zeros(size(values, 1), size(points_m, 1));
+function near = around(map, points_m)
+% The nodes that take part at every point along x, y and z, and their weights; none outside.
+    near = repmat(struct('x', [], 'y', [], 'z', [], 'weight', []), size(points_m, 1), 1);
     for p = 1:size(points_m, 1)
-        [ix, wx] = stencil(map.x_m, points_m(p, 1));
-        [iy, wy] = stencil(map.y_m, points_m(p, 2));
-        [iz, wz] = stencil(map.z_m, points_m(p, 3));
-        if isempty(ix) || isempty(iy) || isempty(iz)
+        [near(p).x, wx] = stencil(map.x_m, points_m(p, 1));
+        [near(p).y, wy] = stencil(map.y_m, points_m(p, 2));
+        [near(p).z, wz] = stencil(map.z_m, points_m(p, 3));
+        near(p).weight = kron(wx, kron(wy, wz)).';
+    end
+end
+
+function found = interpolate(near, values, i, axis)
+% Values [map, z, y, x, i, axis] at points: tricubic Lagrange, one row a map, one column a point; 0 outside.
+    found = zeros(size(values, 1), numel(near));
+    for p = 1:numel(near)
+        if isempty(near(p).weight)
             continue
         end
-        near = values(:, iz, iy, ix);
-        found(:, p) = reshape(near, size(values, 1), []) * kron(wx, kron(wy, wz)).';
+        part = values(:, near(p).z, near(p).y, near(p).x, i, axis);
+        found(:, p) = reshape(part, size(values, 1), []) * near(p).weight;
     end
 end
 
@@ -146,12 +154,14 @@ function [index, weight] = stencil(nodes, position)
     above = sum(nodes <= position);
     start = min(max(above - 2, 0), numel(nodes) - count);
     index = start + (1:count);
-    near = nodes(index);
-    weight = ones(1, count);
-    for k = 1:count
-        others = near([1:k - 1, k + 1:count]);
-        weight(k) = prod(position - others) / prod(near(k) - others);
-    end
+    near = reshape(nodes(index), 1, count);
+    all_ones = ones(count, 1);
+    from = all_ones * (position - near);
+    apart = near.' * all_ones.' - all_ones * near;
+    own = 1:count + 1:count * count;
+    from(own) = 1;
+    apart(own) = 1;
+    weight = (prod(from, 2) ./ prod(apart, 2)).';
 end
 
 function found = height(map, points_m)
