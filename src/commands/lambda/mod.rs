@@ -20,7 +20,6 @@ mod warnings;
 mod working_point;
 
 use std::borrow::Cow;
-use std::f64::consts::SQRT_2;
 
 use serde::Serialize;
 
@@ -267,9 +266,11 @@ pub fn run(
     let sample = |how| scattered::run(document, inputs.clone(), how, progress);
     let sampled = sampling.map(sample).transpose()?;
     let chosen = (sampled.as_ref().map(ForcePoints::of_scattered)).transpose()?;
+    let by_area = || ForcePoints::of_object(&points, Weights::Area, &design.workspace);
     let others = match sampling.zip(chosen.as_ref()) {
         Some((how, chosen)) => {
-            other_points(how, chosen, |how| ForcePoints::of_scattered(&sample(how)?))?
+            let sample = |how| ForcePoints::of_scattered(&sample(how)?);
+            other_points(how, chosen, sample, by_area)?
         }
         None => OtherPoints::default(),
     };
@@ -315,7 +316,7 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = whole(&chosen)?;
-    let quadrature = others.quadrature(&report.file, &grid, |points| solve_with(points, &plain))?;
+    let quadrature = others.quadrature(&report.file, |points| solve_with(points, &plain))?;
     report.add_quadrature(quadrature);
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
@@ -398,52 +399,54 @@ pub(crate) fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
     }
 }
 
-/// Points on no grid that others are compared with.
+/// Points that those on no grid are compared with.
 #[derive(Default)]
 struct OtherPoints {
     points: Vec<ForcePoints>,
+    /// Their changes count so many times.
+    times: f64,
     /// How the comparison is stated.
     method: &'static str,
 }
 
 /// Points of patches twice as wide where the deviation decides, and where the width does: errors of both may have
 /// opposite signs. Where the width decides of few patches, which may be whole faces already, of half that width. None
-/// that are the same as the `chosen`. Of random points as many others, and half as many, which are off twice as far.
+/// that are the same as the `chosen`. Where there are none, and of random points, those of the grid by area.
 fn other_points(
     how: Sampling,
     chosen: &ForcePoints,
     points_of: impl Fn(Sampling) -> Result<ForcePoints, RunError>,
+    by_area: impl FnOnce() -> ForcePoints,
 ) -> Result<OtherPoints, RunError> {
-    let (max_deviation_m, widest_m) = match how {
-        Sampling::Adaptive {
-            max_deviation_m,
-            widest_m: Some(widest_m),
-        } => (max_deviation_m, widest_m),
-        Sampling::Adaptive { widest_m: None, .. } => return Ok(OtherPoints::default()),
-        Sampling::Poisson { spacing_m, seed } => {
-            let points = |spacing_m, seed| points_of(Sampling::Poisson { spacing_m, seed });
-            let as_many = points(spacing_m, seed.wrapping_add(1))?;
-            return Ok(OtherPoints {
-                points: vec![as_many, points(SQRT_2 * spacing_m, seed)?],
-                method: "an estimate: one and a half times the changes from as many other random points, and from half \
-                         as many",
-            });
+    let mut others = Vec::new();
+    if let Sampling::Adaptive {
+        max_deviation_m,
+        widest_m: Some(widest_m),
+    } = how
+    {
+        let points = |deviations: f64, widths: f64| {
+            points_of(Sampling::Adaptive {
+                max_deviation_m: deviations * max_deviation_m,
+                widest_m: Some(widths * widest_m),
+            })
+        };
+        let mut by_width = points(1.0, 2.0)?;
+        if 2 * by_width.positions_m.len() > chosen.positions_m.len() {
+            by_width = points(1.0, 0.5)?;
         }
-    };
-    let points = |deviations: f64, widths: f64| {
-        points_of(Sampling::Adaptive {
-            max_deviation_m: deviations * max_deviation_m,
-            widest_m: Some(widths * widest_m),
-        })
-    };
-    let mut by_width = points(1.0, 2.0)?;
-    if 2 * by_width.positions_m.len() > chosen.positions_m.len() {
-        by_width = points(1.0, 0.5)?;
+        others = vec![points(4.0, 1.0)?, by_width];
+        others.retain(|other| other.positions_m != chosen.positions_m);
     }
-    let mut others = vec![points(4.0, 1.0)?, by_width];
-    others.retain(|other| other.positions_m != chosen.positions_m);
+    if others.is_empty() {
+        return Ok(OtherPoints {
+            points: vec![by_area()],
+            times: 1.0,
+            method: "an estimate: the change from the grid's points by area, and what these are off by",
+        });
+    }
     Ok(OtherPoints {
         points: others,
+        times: 1.5,
         method: "an estimate: one and a half times the changes from patches of other widths, where the deviation \
                  decides and where the width does",
     })
@@ -454,41 +457,24 @@ impl OtherPoints {
     fn quadrature(
         &self,
         file: &LambdaFile,
-        grid: &LambdaFile,
         solve: impl Fn(&ForcePoints) -> Result<LambdaReport, RunError>,
     ) -> Result<Option<StageAccuracy>, RunError> {
-        if self.points.is_empty() {
-            return Ok(off_grid(file, grid));
-        }
-        let mut changes = Some(0.0);
-        let fine = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0);
+        let Some(here) = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) else {
+            return Ok(None);
+        };
+        let mut changes = 0.0;
         for points in &self.points {
-            let other = solve(points)?.file.lambda_n_per_m;
-            let change = fine
-                .zip(other)
-                .map(|(fine, other)| (other / fine - 1.0).abs());
-            changes = changes.zip(change).map(|(sum, change)| sum + change);
+            let other = solve(points)?.file;
+            let there = other.lambda_n_per_m.unwrap_or(0.0) / here;
+            let of_other = other.accuracy.get("lambda_of_points");
+            changes += (there - 1.0).abs() + of_other.map_or(0.0, |stage| stage.estimate * there);
         }
-        Ok(changes.map(|changes| StageAccuracy {
-            estimate: 1.5 * changes,
+        Ok(Some(StageAccuracy {
+            estimate: self.times * changes,
             relative_to: "lambda".to_owned(),
             method: self.method.to_owned(),
         }))
     }
-}
-
-/// The same where no coarser points are to be compared with: from the grid's, and what these are off by.
-fn off_grid(file: &LambdaFile, grid: &LambdaFile) -> Option<StageAccuracy> {
-    let here = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0)?;
-    let there = grid.lambda_n_per_m.unwrap_or(0.0);
-    let of_grid = grid.accuracy.get("lambda_of_points");
-    let of_grid = of_grid.map_or(0.0, |stage| stage.estimate * there / here);
-    Some(StageAccuracy {
-        estimate: (there / here - 1.0).abs() + of_grid,
-        relative_to: "lambda".to_owned(),
-        method: "an estimate: the change from the grid's points, and what these are off by"
-            .to_owned(),
-    })
 }
 
 /// The change from the grid's points to other points.
