@@ -52,7 +52,7 @@ fn regression_rows_of_the_front_lacked_their_choice_and_its_variables() {
     assert!(front.iter().all(|point| point["layout"].is_string()));
 }
 
-/// The costs were those before lengths are rounded, 2e-6 beside those of the design in the row.
+/// The costs were those before lengths are rounded, 8e-9 beside those of the design in the row here.
 #[test]
 fn regression_the_front_s_costs_were_of_other_designs_than_its_rows() {
     let place = Place::empty();
