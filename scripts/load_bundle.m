@@ -482,7 +482,7 @@ function [d, slope, curvature, changed] = dual_place(d, y, n, all_free)
     d.at = at;
     free = d.rows(at == 0, 1:n);
     slope = d.target(1:n) - d.eps(1:n) .* y(1:n) - d.rows(:, 1:n).' * d.currents;
-    curvature = diag(d.eps(1:n)) + free.' * (d.conductance(at == 0) .* free);
+    curvature = diag(d.eps(1:n)) + free.' * (d.conductance(at == 0, 1) .* free);
 end
 
 function [d, y] = climb(d, y, n)
@@ -563,8 +563,8 @@ function [d, optimal] = finish_exactly(d, climbed, n)
     optimal = false;
     free = d.at == 0;
     rows = d.rows(free, 1:n);
-    system = rows.' * (d.conductance(free) .* rows);
-    right = d.target(1:n) - d.rows(~free, 1:n).' * d.currents(~free);
+    system = rows.' * (d.conductance(free, 1) .* rows);
+    right = d.target(1:n) - d.rows(~free, 1:n).' * d.currents(~free, 1);
     y = climbed;
     for turn = 1:3
         step = cholesky(system + diag(d.eps(1:n)), right - system * y(1:n), 0);
@@ -597,14 +597,14 @@ function [d, nearest] = finish_nearest(d, n)
 % Solves the free currents for the nearest force, of several by the least power; whether it is. Where the sum binds
 % they share what the others leave of it, and a coil counts by how much its force differs from their mean.
     nearest = false;
-    free = find(d.at == 0);
+    free = d.at == 0;
     d.currents(free) = 0;
     left = missing_force(d);
-    conductance = d.conductance(free);
+    conductance = d.conductance(free, 1);
     more = d.rows(free, 1:3);
     least = 1e-6 * max([sqrt(conductance) .* sqrt(sum(more .^ 2, 2)); 0]);
-    shared = zeros(numel(free), 1);
-    if n == 4 && ~isempty(free)
+    shared = zeros(nnz(free), 1);
+    if n == 4 && any(free)
         middle = sum(more .* conductance, 1) / sum(conductance);
         more = more - middle;
         shared = left(4) * conductance / sum(conductance);
@@ -621,11 +621,12 @@ function [d, nearest] = finish_nearest(d, n)
         y = axes * solved;
     end
     found = shared + conductance .* (more * y);
-    slack = 1e-11 * (d.upper(free) - d.lower(free));
-    if ~all(found >= d.lower(free) - slack & found <= d.upper(free) + slack)
+    [low, high] = deal(d.lower(free, 1), d.upper(free, 1));
+    slack = 1e-11 * (high - low);
+    if ~all(found >= low - slack & found <= high + slack)
         return
     end
-    d.currents(free) = min(max(found, d.lower(free)), d.upper(free));
+    d.currents(free) = min(max(found, low), high);
     nearest = is_nearest(d, n);
 end
 

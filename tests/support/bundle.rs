@@ -292,7 +292,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
 }
 
 /// What the bundles hold that every loader is held to.
-pub const SAMPLES: [&str; 13] = [
+pub const SAMPLES: [&str; 14] = [
     "upright",
     "upright with pull",
     "tilted with pull",
@@ -309,6 +309,8 @@ pub const SAMPLES: [&str; 13] = [
     "upright vector, two idle, reversing, a small sum",
     // Broke: of coils that are alike no currents out of reach were proven.
     "upright vector, two alike, reversing, a small sum",
+    // Broke: Octave ended where a single coil was at a limit.
+    "upright vector, one coil",
 ];
 
 impl Sample {
@@ -332,6 +334,9 @@ impl Sample {
         }
         if with("two idle") {
             made = made.without_force(1);
+        }
+        if with("one coil") {
+            made = made.with_one_coil();
         }
         if with("two alike") {
             made = made.with_coils(|nodes, component| component.copy_within(..nodes, nodes));
@@ -435,6 +440,19 @@ impl Sample {
     /// The sample of a bundle in which this coil of the map gives no force.
     pub fn without_force(self, coil: usize) -> Self {
         self.with_coils(|nodes, component| component[coil * nodes..(coil + 1) * nodes].fill(0.0))
+    }
+
+    /// The sample of a bundle whose map has its first coil alone.
+    fn with_one_coil(mut self) -> Self {
+        let map = &mut self.map;
+        let nodes = map.gz_t_per_m_per_a.len() / map.coil.len();
+        let sides = map.sides_t_per_m_per_a.iter_mut().flatten();
+        for component in sides.chain([&mut map.gz_t_per_m_per_a]) {
+            component.to_mut().truncate(nodes);
+        }
+        map.coil.to_mut().truncate(1);
+        self.manifest.map.coil.truncate(1);
+        self
     }
 
     /// The sample of a bundle with each component of the map changed, [coil, node].
