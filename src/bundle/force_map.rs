@@ -7,7 +7,7 @@
 
 use super::load::Bundle;
 use super::npz::MapArrays;
-use fluxform_numerics::lagrange::{ORDER_NODES, stencil};
+use fluxform_numerics::lagrange::{ORDER_NODES, around, stencil};
 
 /// Coils summed together.
 const GROUP: usize = 4;
@@ -193,10 +193,7 @@ impl ForceMap {
     /// The largest |force per ampere| of any coil on the planes of nodes around a height, N/A.
     #[must_use]
     pub fn largest_near_n_per_a(&self, z_m: f64) -> f64 {
-        let nodes = &self.axes_m[2];
-        let above = nodes.partition_point(|&node| node <= z_m);
-        let around = above.saturating_sub(1)..(above + 1).min(nodes.len());
-        self.largest_n_per_a[around]
+        self.largest_n_per_a[around(&self.axes_m[2], z_m)]
             .iter()
             .copied()
             .fold(0.0, f64::max)

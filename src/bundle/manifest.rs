@@ -434,7 +434,8 @@ pub struct MapSummary {
 pub struct SidesOfMap {
     /// The arrays of `map.npz`, `[coil, z, y, x]`, T/m/A.
     pub arrays: [String; 2],
-    /// Between the nodes, relative to the largest value of the component at the height.
+    /// Between the nodes, relative to the largest value of the component at the height, or on the nodes around it
+    /// where that is smaller.
     pub largest_error: [f64; 2],
 }
 

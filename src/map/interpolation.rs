@@ -7,8 +7,8 @@ use fluxform_base::progress::Silent;
 use fluxform_field::source::AxialSource;
 use fluxform_numerics::lagrange;
 
-/// The largest error found of a component, relative to its largest value at the height, and at how many
-/// places it was looked for.
+/// The largest error found of a component, and at how many places it was looked for: relative to its largest value at
+/// the height, or on the planes of nodes around it where nodes miss the peak and that is smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InterpolationError {
     /// Relative error.
@@ -106,8 +106,7 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
 
 /// Compares interpolated components (each [coil, z, y, x] on `grid`) with direct values in the
 /// middle of cells, faces and edges, in the four lowest layers and the highest, for
-/// a few coils that differ in where their axes lie: an error for each component, relative to its own largest value
-/// at the height.
+/// a few coils that differ in where their axes lie: an error for each component.
 ///
 /// # Errors
 /// Those of `direct`.
@@ -120,6 +119,19 @@ pub fn interpolation_errors_by(
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let nodes = x.len() * y.len() * z.len();
     let watched = watched(coils, grid);
+    let plane_nodes = x.len() * y.len();
+    let on_nodes: Vec<Vec<f64>> = maps
+        .iter()
+        .map(|map| {
+            let plane = |level: usize| {
+                let of =
+                    move |coil: &usize| &map[coil * nodes + level * plane_nodes..][..plane_nodes];
+                watched.iter().flat_map(of)
+            };
+            let size = |level| plane(level).fold(0.0_f64, |most, value| most.max(value.abs()));
+            (0..z.len()).map(size).collect()
+        })
+        .collect();
     let placed: Vec<PlacedCoil> = watched.iter().map(|coil| coils[*coil]).collect();
     let nothing = InterpolationError {
         largest: 0.0,
@@ -137,7 +149,8 @@ pub fn interpolation_errors_by(
         let along_x = stencils(x, &places.x_m);
         let along_y = stencils(y, &places.y_m);
         let along_z = stencils(z, &places.z_m);
-        for ((worst, map), exact) in all.iter_mut().zip(maps).zip(&exact) {
+        let components = all.iter_mut().zip(maps).zip(&exact).zip(&on_nodes);
+        for (((worst, map), exact), on_nodes) in components {
             for (k, stencil_z) in along_z.iter().enumerate() {
                 let mut error = 0.0_f64;
                 let mut size = 0.0_f64;
@@ -150,6 +163,11 @@ pub fn interpolation_errors_by(
                         error = error.max((value - direct).abs());
                         size = size.max(direct.abs());
                     }
+                }
+                let near = &on_nodes[lagrange::around(z, places.z_m[k])];
+                let near = near.iter().copied().fold(0.0, f64::max);
+                if near > 0.0 {
+                    size = size.min(near);
                 }
                 if size > 0.0 {
                     worst.largest = worst.largest.max(SAFETY * error / size);

@@ -8,6 +8,8 @@
 //! (equal steps h; the products of the distances to four nodes are at most 9/16 h^4 and h^4),
 //! times the other axes' Lebesgue constants (1.25 inside, 1.63 at the borders).
 
+use std::ops::Range;
+
 /// The most nodes that take part along one axis.
 pub const ORDER_NODES: usize = 4;
 
@@ -38,6 +40,14 @@ pub fn holds(nodes: &[f64], position: f64) -> bool {
                 .contains(&position)
         }
     }
+}
+
+/// The nodes next to `position` on increasing `nodes`, by index: the one at or below it and the next; beyond an end
+/// that end's.
+#[must_use]
+pub fn around(nodes: &[f64], position: f64) -> Range<usize> {
+    let above = nodes.partition_point(|&node| node <= position);
+    above.saturating_sub(1)..(above + 1).min(nodes.len())
 }
 
 /// The stencil at `position` on strictly increasing `nodes`; `None` where they do not hold it ([`holds`]).

@@ -36,7 +36,8 @@ pub struct PassiveMap {
     pub largest_n: f64,
     /// Estimated error of the nodes.
     pub accuracy: StageAccuracy,
-    /// Error of interpolating between nodes, relative to the largest pull at the height.
+    /// Error of interpolating between nodes, relative to the largest pull at the height, or on the nodes around it
+    /// where that is smaller.
     pub between: f64,
     /// Places at which `between` was looked for.
     pub samples: usize,
@@ -107,8 +108,8 @@ impl PassiveMap {
     #[must_use]
     pub fn definition(&self) -> String {
         format!(
-            "of the pull, relative to the largest pull at that height: {SAFETY} times the largest \
-             difference from its table at {} places in the middles of cells, faces and edges, in the four \
+            "of the pull, relative to the largest pull at that height (on the nodes around it, where that is \
+             smaller): {SAFETY} times the largest difference from its table at {} places in the middles of cells, faces and edges, in the four \
              lowest layers and the highest, where it is largest",
             self.samples
         )
@@ -184,6 +185,7 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
             .collect()
     };
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
+    let levels: Vec<f64> = values.chunks(x.len() * y.len()).map(largest).collect();
     let (mut worst, mut samples) = (0.0_f64, 0);
     for (x_m, y_m, z_m) in [
         (middles(x), middles(y), middles(z)),
@@ -198,20 +200,24 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
         };
         let exact = table.on(&places);
         let plane = places.x_m.len() * places.y_m.len();
-        for (z, exact) in places.z_m.iter().zip(exact.chunks(plane)) {
+        for (z_m, exact) in places.z_m.iter().zip(exact.chunks(plane)) {
             let mut error = 0.0_f64;
             for (i, exact) in exact.iter().enumerate() {
                 let at = [
                     places.x_m[i % places.x_m.len()],
                     places.y_m[i / places.x_m.len()],
-                    *z,
+                    *z_m,
                 ];
-                if let Some(cell) = lagrange::locate([x, y, &grid.z_m], at) {
+                if let Some(cell) = lagrange::locate([x, y, z], at) {
                     error = error.max((cell.value(values) - exact).abs());
                 }
             }
             samples += plane;
-            let size = largest(exact);
+            let near = largest(&levels[lagrange::around(z, *z_m)]);
+            let size = match largest(exact) {
+                size if near > 0.0 => size.min(near),
+                size => size,
+            };
             if size > 0.0 {
                 worst = worst.max(SAFETY * error / size);
             }

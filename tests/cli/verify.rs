@@ -278,6 +278,31 @@ fn maps_whose_nodes_lie_beside_the_coils_verify() {
     }
 }
 
+/// Regression: the largest pull on nodes beside the core was a hundredth of that over it, to which the stated error was
+/// relative.
+#[test]
+fn a_pull_that_nodes_miss_verifies() {
+    for (half_mm, nodes) in [(30, 2), (12, 2), (30, 3)] {
+        let place = Place::new();
+        place.write(
+            "one.toml",
+            &format!(
+                "name = \"one\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 60\n[wire]\n\
+                 diameter_mm = 0.7\n[core]\n[array]\nrows = 1\ncolumns = 1\n[magnet]\npassive_force = true\n\
+                 [workspace]\nx_mm = [-{half_mm}, {half_mm}, {nodes}]\ny_mm = [-{half_mm}, {half_mm}, {nodes}]\n\
+                 z_mm = [20, 60, 9]\n"
+            ),
+        );
+        place.write(
+            "ramp.toml",
+            "name = \"ramp\"\nprimitive = \"wedge\"\nside_mm = 20\nlow_mm = 25\nhigh_mm = 45\n[points]\n\
+             x_mm = [-10, 10, 5]\ny_mm = [-10, 10, 5]\n",
+        );
+        place.run(&["calibrate", "one.toml", "ramp.toml"]).ends(0);
+        place.run(&["verify", "results/one/ramp"]).ends(0);
+    }
+}
+
 #[test]
 fn fresh_bundles_verify_whatever_was_requested() {
     for (name, [core, array, magnet, supply], args, code) in CASES {

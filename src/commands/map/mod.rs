@@ -559,8 +559,8 @@ pub(crate) fn workspace_grid(design: &Design) -> Grid {
 pub(crate) fn summary(made: &SceneMap, components: Components) -> MapSummary {
     let (map, between) = (&made.map, made.between);
     let definition = format!(
-        "of dB_z/dz, relative to the largest |dB_z/dz| at that height: 1.25 times the largest \
-         difference from direct values at {} places in the middles of cells, faces and edges, in the four \
+        "of dB_z/dz, relative to the largest |dB_z/dz| at that height (of the nodes around it, where that is \
+         smaller): 1.25 times the largest difference from direct values at {} places in the middles of cells, faces and edges, in the four \
          lowest layers and the highest, where it is largest, of the innermost and the outermost coil and of \
          those whose axes are nearest to a node and to the middle of a cell",
         between.samples

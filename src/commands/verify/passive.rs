@@ -1,5 +1,7 @@
 //! The unpowered steel's pull.
 
+use std::ops::Range;
+
 use super::route::FINER;
 use super::{Bounds, Check, check, ratio};
 use crate::RunError;
@@ -58,11 +60,9 @@ pub(super) fn checks(
         return Ok(Vec::new());
     };
     let [_, nz, ny, nx] = map.shape();
-    let sizes: Vec<f64> = finer
-        .force_z_n
-        .chunks_exact(nx * ny)
-        .map(|plane| plane.iter().fold(0.0_f64, |most, f| most.max(f.abs())))
-        .collect();
+    let largest = |plane: &[f64]| plane.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+    let planes = finer.force_z_n.chunks_exact(nx * ny);
+    let mut sizes: Vec<f64> = planes.map(largest).collect();
     let worst = values
         .iter()
         .zip(&finer.force_z_n)
@@ -78,16 +78,20 @@ pub(super) fn checks(
     )];
 
     let places = places(&grid);
-    let points: Vec<[f64; 3]> = places.iter().map(|(_, at)| *at).collect();
+    let points: Vec<[f64; 3]> = places.iter().map(|(at, _)| *at).collect();
     let Some(sure) = passive::direct_z_n(scene, &points, tolerance)? else {
         return Ok(checks);
     };
+    // Where nodes miss the peak, the places show it.
+    for ((_, around), sure) in places.iter().zip(&sure) {
+        sizes[around.start] = sizes[around.start].max(sure.abs());
+    }
     let errors: Vec<f64> = places
         .iter()
         .zip(&sure)
-        .map(|((level, at), sure)| {
+        .map(|((at, around), sure)| {
             let stored = bundle.passive_force_n(*at).unwrap_or(f64::INFINITY);
-            ratio((stored - sure).abs(), sizes[*level])
+            ratio((stored - sure).abs(), largest(&sizes[around.clone()]))
         })
         .collect();
     let (on, between) = errors.split_at(PULL_SAMPLES.min(nx * ny * nz));
@@ -106,8 +110,8 @@ pub(super) fn checks(
     Ok(checks)
 }
 
-/// Places on nodes, then as many between them, each with the level at or below it.
-fn places(grid: &Grid) -> Vec<(usize, [f64; 3])> {
+/// Places on nodes, then as many between them, each with the levels of nodes around it.
+fn places(grid: &Grid) -> Vec<([f64; 3], Range<usize>)> {
     let [nx, ny, nz] = [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
     let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
     let on_nodes = spread(nx * ny * nz, PULL_SAMPLES)
@@ -126,7 +130,9 @@ fn places(grid: &Grid) -> Vec<(usize, [f64; 3])> {
                 Some(next) => nodes[i] + t * (next - nodes[i]),
                 None => nodes[i],
             };
-            (z, [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)])
+            let at_m = [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)];
+            let last = if t > 0.0 { z + 2 } else { z + 1 };
+            (at_m, z..last.min(nz))
         })
         .collect()
 }
