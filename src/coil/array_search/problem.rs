@@ -385,26 +385,6 @@ impl<'a> ArrayProblem<'a> {
         best.map(|(_, sample, judged)| (sample, judged))
     }
 
-    /// The variables of a design as it is made: lengths rounded, to the other side where the nearer one breaks a limit
-    /// that `x` meets, as far as limits are known without physics.
-    #[must_use]
-    pub fn made(&self, x: &[f64]) -> Vec<f64> {
-        let broken = |x: &[f64]| self.bounds(x, None).iter().filter(|b| !b.is_met()).count();
-        let mut made = self.space.made(x);
-        let (least, mut now) = (broken(x), broken(&made));
-        for (index, beyond) in self.space.made_beyond(x, &made) {
-            if now <= least {
-                break;
-            }
-            let near = std::mem::replace(&mut made[index], beyond);
-            match broken(&made) {
-                fewer if fewer < now => now = fewer,
-                _ => made[index] = near,
-            }
-        }
-        made
-    }
-
     /// The computed properties of the design as it is made.
     ///
     /// # Errors
@@ -692,6 +672,25 @@ fn is_solid(design: &Design) -> bool {
 impl Problem for ArrayProblem<'_> {
     fn variables(&self) -> &[Variable] {
         self.space.variables()
+    }
+
+    /// Lengths are rounded, to the other side where the nearer one breaks a limit that `x` meets, as far as limits are
+    /// known without physics.
+    fn made(&self, x: &[f64]) -> Vec<f64> {
+        let broken = |x: &[f64]| self.bounds(x, None).iter().filter(|b| !b.is_met()).count();
+        let mut made = self.space.made(x);
+        let (least, mut now) = (broken(x), broken(&made));
+        for (index, beyond) in self.space.made_beyond(x, &made) {
+            if now <= least {
+                break;
+            }
+            let near = std::mem::replace(&mut made[index], beyond);
+            match broken(&made) {
+                fewer if fewer < now => now = fewer,
+                _ => made[index] = near,
+            }
+        }
+        made
     }
 
     fn outputs(&self, x: &[f64]) -> Result<Option<Vec<f64>>, Interrupted> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use fluxform_base::progress::{Interrupted, interruptible, to_its_end};
 use fluxform_design::Design;
-use fluxform_numerics::mixed_search::{MET, Search, Settings};
+use fluxform_numerics::mixed_search::{MET, Problem, Search, Settings};
 
 use super::choice::{Choice, choices};
 use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges};
@@ -158,9 +158,9 @@ impl SearchedChoice {
     fn of(problem: &ArrayProblem, search: &Search) -> Self {
         let space = &problem.space;
         let best = problem.best(search);
-        let values = best.as_ref().map_or_else(BTreeMap::new, |(sample, _)| {
-            space.named(&problem.made(&sample.x))
-        });
+        let values = best
+            .as_ref()
+            .map_or_else(BTreeMap::new, |(sample, _)| space.named(&sample.x));
         let met = best.filter(|(_, judged)| judged.excess() <= MET);
         Self {
             coils: space.coils(),
@@ -226,10 +226,7 @@ impl Found<'_> {
         let Some(best) = accepted.filter(|best| best.rank(self.problem) > known) else {
             return Ok(false);
         };
-        self.best = Candidate {
-            x: self.problem.made(&best.x),
-            ..best
-        };
+        self.best = best;
         self.choices[0] = SearchedChoice::of(self.problem, &self.search);
         Ok(true)
     }
@@ -528,10 +525,6 @@ pub fn run<'a>(
     }
     let (best, choices) = to_its_end(|| {
         let best = accepted.unwrap_or_else(|Interrupted| searched(problem, &search));
-        let best = best.map(|best| Candidate {
-            x: problem.made(&best.x),
-            ..best
-        });
         let all = std::iter::once((index, &search)).chain(
             left_out
                 .iter()
@@ -621,7 +614,7 @@ fn searched(problem: &ArrayProblem, search: &Search) -> Option<Candidate> {
     let (sample, _) = problem.best(search)?;
     let physical = problem.properties(sample)?;
     Some(Candidate {
-        bounds: problem.bounds(&problem.made(&sample.x), Some(&physical)),
+        bounds: problem.bounds(&sample.x, Some(&physical)),
         x: sample.x.clone(),
         physical,
         level: Level::Search,

@@ -108,6 +108,11 @@ fn to_nanometres(length_mm: f64) -> f64 {
     (length_mm * 1e6).round() / 1e6 + 0.0
 }
 
+/// To whole steps.
+fn rounded_mm(length_mm: f64, step_mm: f64) -> f64 {
+    to_nanometres((length_mm / step_mm).round() * step_mm)
+}
+
 impl Space {
     /// The designs of a choice about `design`, as far as `search` varies it.
     ///
@@ -499,8 +504,7 @@ impl Space {
     pub fn made(&self, x: &[f64]) -> Vec<f64> {
         let rounded = |((x, variable), axis): ((&f64, &Variable), &Axis)| match variable.values {
             Values::Continuous => {
-                let step = made_step_mm(axis);
-                to_nanometres((x / step).round() * step).clamp(variable.low, variable.high)
+                rounded_mm(*x, made_step_mm(axis)).clamp(variable.low, variable.high)
             }
             Values::Whole | Values::Listed(_) => *x,
         };
@@ -525,16 +529,20 @@ impl Space {
         variables.any(|variable| matches!(variable.values, Values::Continuous))
     }
 
-    /// How much of a micrometre the lengths that `decides` names may change where they are made: those at an end of their
-    /// range stay there.
+    /// How much of a micrometre the lengths that `decides` names may change where they are made: those that are rounded
+    /// already, and those at an end of their range, stay.
     pub(super) fn rounding(&self, x: &[f64], decides: impl Fn(Axis) -> bool) -> f64 {
         let variables = x.iter().zip(&self.variables).zip(&self.axes);
         let rounded = variables.filter(|((_, variable), axis)| {
             matches!(variable.values, Values::Continuous) && decides(**axis)
         });
         let from_end = rounded.map(|((x, variable), axis)| {
+            let step = made_step_mm(axis);
             let nearest = (x - variable.low).min(variable.high - x);
-            (nearest / made_step_mm(axis)).clamp(0.0, 1.0)
+            match rounded_mm(*x, step) == *x {
+                true => 0.0,
+                false => (nearest / step).clamp(0.0, 1.0),
+            }
         });
         from_end.fold(0.0, f64::max)
     }

@@ -11,7 +11,7 @@ use fluxform_design::Design;
 use fluxform_numerics::front::front;
 use fluxform_numerics::mixed_search::descent::Judged;
 use fluxform_numerics::mixed_search::surrogate::Surrogate;
-use fluxform_numerics::mixed_search::{Sample, Search, Values};
+use fluxform_numerics::mixed_search::{Problem, Sample, Search, Values};
 
 use super::problem::{ArrayProblem, Bounded, Physical};
 use super::search::{ArrayChoice, Candidate, Found};
@@ -293,8 +293,7 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
             let mut others = bounds.iter().filter(|bound| bound.name != Some(name));
             others.all(Bounded::is_met)
         });
-        let made = problem.made(&sample.x);
-        let costs = TRADED.map(|(_, name)| traded(problem, &made, &physical, name));
+        let costs = TRADED.map(|(_, name)| traded(problem, &sample.x, &physical, name));
         let [Some(mass), Some(power), Some(settling)] = costs else {
             return None;
         };
@@ -306,7 +305,7 @@ fn traded_designs(problem: &ArrayProblem, search: &Search, source: usize) -> Vec
             costs: [mass, power, settling],
             met: bounds.iter().all(Bounded::is_met),
             met_but,
-            values: problem.space.named(&made),
+            values: problem.space.named(&sample.x),
             source,
             x: sample.x.clone(),
             full: problem.is_known_fully(&sample.x),
@@ -349,6 +348,7 @@ impl<'s, 'a> View<'s, 'a> {
 
     /// The objective of a design that is evaluated for it, where it meets the limits.
     fn evaluated(&mut self, x: Vec<f64>) -> Result<Option<f64>, Interrupted> {
+        let x = self.problem.made(&x);
         self.search.evaluate(vec![x.clone()])?;
         let sample = self.search.samples().iter().find(|sample| sample.x == x);
         let judged = sample.and_then(|sample| self.problem.judged_sample(sample));
@@ -494,8 +494,11 @@ impl<'s, 'a> View<'s, 'a> {
         let mut no_better = 0;
         for _ in 0..self.effort.descents {
             let x = best.as_ref().map_or(&from, |(_, x)| x);
-            let next = self.best_below(x, name, most).filter(|next| next != x);
-            let Some(next) = next else { break };
+            let next = self.best_below(x, name, most);
+            let next = next.map(|next| self.problem.made(&next));
+            let Some(next) = next.filter(|next| next != x) else {
+                break;
+            };
             self.search.evaluate(vec![next.clone()])?;
             if let Some(surrogate) = self.search.surrogate() {
                 self.surrogate = surrogate;

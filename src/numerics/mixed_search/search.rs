@@ -14,6 +14,11 @@ pub trait Problem: Sync {
     /// The variables.
     fn variables(&self) -> &[Variable];
 
+    /// The design that is made of `x`, which is what is evaluated: lengths may be rounded.
+    fn made(&self, x: &[f64]) -> Vec<f64> {
+        x.to_vec()
+    }
+
     /// The costly outputs at `x`; `None` where there is no such design.
     ///
     /// # Errors
@@ -553,12 +558,14 @@ impl<'a> Search<'a> {
         chosen
     }
 
-    /// Evaluates designs that were not evaluated before, on all cores; returns nothing where
-    /// interrupted but keeps those that are complete.
+    /// Evaluates designs as they are made, but for those that were evaluated before, on all cores; returns nothing
+    /// where interrupted but keeps those that are complete.
     ///
     /// # Errors
     /// Interruption.
-    pub fn evaluate(&mut self, mut designs: Vec<Vec<f64>>) -> Result<(), Interrupted> {
+    pub fn evaluate(&mut self, designs: Vec<Vec<f64>>) -> Result<(), Interrupted> {
+        let made = designs.iter().map(|x| self.problem.made(x));
+        let mut designs: Vec<Vec<f64>> = made.collect();
         designs.retain(|x| self.samples.iter().all(|sample| sample.x != *x));
         designs.dedup();
         designs.truncate(
