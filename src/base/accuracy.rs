@@ -11,6 +11,9 @@ const GOVERNED: [&str; 5] = ["field", "inductance", "mutual_inductance", "forces
 /// Those of the flux density inside a core, which has a coarser default.
 const GOVERNED_IN_CORE: [&str; 2] = ["core_field", "core_field_mean"];
 
+/// That of the force of one coil or at a place, whose default allows for the magnet's dipoles.
+const GOVERNED_OF_FORCE: [&str; 1] = ["force"];
+
 /// The stages that a tolerance governs and that miss it, by name. There is one meaning of
 /// *reached*: every such stage's stated error is at most the tolerance.
 pub fn missed<'a, S: AsRef<str> + 'a>(
@@ -26,6 +29,14 @@ pub fn missed_in_core<'a, S: AsRef<str> + 'a>(
     tolerance: f64,
 ) -> Vec<String> {
     missed_among(&GOVERNED_IN_CORE, stages, tolerance)
+}
+
+/// As [`missed`], of a force on the magnet.
+pub fn missed_of_force<'a, S: AsRef<str> + 'a>(
+    stages: impl IntoIterator<Item = (&'a S, &'a StageAccuracy)>,
+    tolerance: f64,
+) -> Vec<String> {
+    missed_among(&GOVERNED_OF_FORCE, stages, tolerance)
 }
 
 fn missed_among<'a, S: AsRef<str> + 'a>(

@@ -12,9 +12,9 @@ use crate::numerics::spread::spread;
 use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
-const SAFETY: f64 = 30.0;
+pub(super) const SAFETY: f64 = 30.0;
 /// Least estimate: what rounding may do, sampled or not.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
+pub(super) const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Places at which values are compared, of all of them.
 const PLACES: usize = 48;
 /// Places at which values are compared above and beside the winding.
@@ -102,7 +102,7 @@ pub(crate) fn compared(
 }
 
 /// Tolerance of the forces that others are compared with, in that of these.
-const FINER: f64 = 1e-2;
+pub(super) const FINER: f64 = 1e-2;
 /// Places at which forces are compared.
 const FORCES: usize = 24;
 

@@ -9,7 +9,7 @@ use super::Scene;
 use super::core_material::SceneCore;
 use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
-use crate::accuracy::{StageAccuracy, missed, missed_in_core};
+use crate::accuracy::{StageAccuracy, missed, missed_in_core, missed_of_force};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck, UsedPower};
 use crate::coil::mutual::{largest_self_inductance_h, slowest_inductance_h};
@@ -104,6 +104,10 @@ impl Rated {
         accuracy_missed.extend(missed_in_core(
             &single.accuracy,
             scene.tolerances.core_field,
+        ));
+        accuracy_missed.extend(missed_of_force(
+            &single.accuracy,
+            scene.tolerances.coil_force,
         ));
         let mut rated = Self {
             coil: CoilSummary {

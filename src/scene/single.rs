@@ -5,13 +5,16 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 use super::core_material::{Material, SceneCore};
+use super::evaluation_sample::{FINER, ROUNDING, SAFETY};
 use super::knee::{FOR_CORES, above_knee};
 use super::tolerances::MAGNET_FINEST;
 use super::{MAGNET_SHARE, Scene, at_current, passive};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
+use crate::design::MagnetModel;
 use crate::field::frame::to_cartesian;
+use crate::field::magnet::{MagnetRule, Node};
 use crate::field::steel::array_steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
@@ -19,6 +22,7 @@ use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::winding::KERNEL_ERROR;
 use crate::field::winding::{AxialField, Winding};
+use crate::numerics::vec3::minus;
 
 /// The steel of the coil.
 #[derive(Debug, Clone, Serialize)]
@@ -125,6 +129,17 @@ fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
     }
 }
 
+/// dB_i/dx_j.
+type Gradient = [[f64; 3]; 3];
+
+/// The tolerance of a coil with its core, which leaves the magnet's dipoles their share.
+fn solved_to(scene: &Scene) -> f64 {
+    match scene.design.magnet.model {
+        MagnetModel::Dipole => scene.tolerances.coil,
+        MagnetModel::Cylinder => (1.0 - MAGNET_SHARE) * scene.tolerances.coil,
+    }
+}
+
 impl Single {
     pub(crate) fn new(scene: &Scene) -> Result<Self, RunError> {
         let height_m = scene.design.target_height_m;
@@ -208,7 +223,7 @@ impl Single {
 
     /// The coil with linear steel, or along a curve without current.
     fn linear(scene: &Scene, core: &SceneCore) -> Result<Self, RunError> {
-        let (shape, tolerance) = (core.shape, scene.tolerances.coil);
+        let (shape, tolerance) = (core.shape, solved_to(scene));
         let height_m = scene.design.target_height_m;
         let mu_r = core.relative_permeability();
         let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
@@ -277,13 +292,13 @@ impl Single {
             accuracy,
             warnings,
             source: Source::Cored(Box::new(coil)),
-            tolerance,
+            tolerance: scene.tolerances.coil,
         })
     }
 
     /// The coil at its rated current along `curve`.
     fn saturated(scene: &Scene, core: &SceneCore, curve: &BhCurve) -> Result<Self, RunError> {
-        let tolerance = scene.tolerances.coil;
+        let tolerance = solved_to(scene);
         let height_m = scene.design.target_height_m;
         let current_a = scene.rated_current_a();
         let state = at_current::solve(scene, core, curve, current_a, tolerance, height_m)?;
@@ -349,7 +364,7 @@ impl Single {
             accuracy,
             warnings,
             source: Source::Saturated(scene.winding, Box::new(state.layer)),
-            tolerance,
+            tolerance: scene.tolerances.coil,
         })
     }
 
@@ -363,20 +378,14 @@ impl Single {
         current_a: f64,
     ) -> Result<TargetSummary, RunError> {
         let height_m = scene.design.target_height_m;
-        let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(MAGNET_FINEST))?;
-        let (mut fields, mut gradients) = (Vec::new(), Vec::new());
-        for node in rule.nodes() {
-            let [x, y, z] = node.offset_m;
-            let axial = self.at(x.hypot(y), height_m + z)?;
-            let mut field = to_cartesian(&axial, x, y);
-            field.field_t_per_a.iter_mut().for_each(|b| *b *= current_a);
-            for row in &mut field.gradient_t_per_m_per_a {
-                row.iter_mut().for_each(|g| *g *= current_a);
-            }
-            fields.push(field.field_t_per_a);
-            gradients.push(field.gradient_t_per_m_per_a);
-        }
+        let finest = MAGNET_SHARE * scene.tolerances.coil_force.max(MAGNET_FINEST);
+        let rule = scene.magnet_rule(height_m, finest)?;
+        let (fields, gradients) = self.over(&rule, height_m, current_a)?;
         let mut force_n = rule.force_n(&gradients);
+        if rule.bound() > 0.0 {
+            let of_force = self.force_stage(scene, &rule, (force_n, current_a))?;
+            self.accuracy.insert("force", of_force);
+        }
         // Quantities that a design does not request are not computed.
         let mut passive_force_n = None;
         if scene.design.magnet.passive_force {
@@ -406,6 +415,65 @@ impl Single {
             torque_n_m: rule.torque_n_m(&fields, &gradients),
             passive_force_n,
         })
+    }
+
+    /// Field, T, and gradient, T/m, at `current_a` at every dipole of a magnet whose centre is on the axis at
+    /// `height_m`.
+    fn over(
+        &self,
+        rule: &MagnetRule,
+        height_m: f64,
+        current_a: f64,
+    ) -> Result<(Vec<[f64; 3]>, Vec<Gradient>), RunError> {
+        let of_node = |node: &Node| {
+            let [x, y, z] = node.offset_m;
+            let axial = self.at(x.hypot(y), height_m + z)?;
+            let of = to_cartesian(&axial, x, y);
+            let gradient = of
+                .gradient_t_per_m_per_a
+                .map(|row| row.map(|g| g * current_a));
+            Ok((of.field_t_per_a.map(|b| b * current_a), gradient))
+        };
+        let pairs = rule.nodes().iter().map(of_node);
+        pairs.collect()
+    }
+
+    /// The error of a force that `rule` gives: the field's, and the dipoles' by a hundred times finer ones where there
+    /// are such.
+    fn force_stage(
+        &self,
+        scene: &Scene,
+        rule: &MagnetRule,
+        (force_n, current_a): ([f64; 3], f64),
+    ) -> Result<StageAccuracy, RunError> {
+        let height_m = scene.design.target_height_m;
+        let field = self
+            .accuracy
+            .get("field")
+            .map_or(0.0, |stage| stage.estimate);
+        let [x, y, z] = scene.moment_a_m2;
+        let size_n = x.hypot(y).hypot(z) * (current_a * self.field.gradient_norm()).abs();
+        // An error of the steel is smooth over the magnet; rounding is not.
+        let of_field = field + KERNEL_ERROR * rule.amplification();
+        let proven = of_field + rule.bound();
+        let (mut estimate, mut method) = (
+            proven,
+            "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
+        );
+        if let Ok(finer) = scene.magnet_rule(height_m, FINER * rule.bound()) {
+            let (_, gradients) = self.over(&finer, height_m, current_a)?;
+            let [x, y, z] = minus(finer.force_n(&gradients), force_n);
+            let sampled = of_field + SAFETY * x.hypot(y).hypot(z) / size_n + ROUNDING;
+            if sampled < estimate {
+                estimate = sampled;
+                method = format!(
+                    "the field's error, and {SAFETY} times the difference from a hundred times finer dipoles of the \
+                     magnet; proven below {proven:.1e}"
+                );
+            }
+        }
+        let relative_to = "the moment times the largest |grad B| over the magnet";
+        Ok(stage(estimate, relative_to, &method))
     }
 
     fn at(&self, r_m: f64, z_m: f64) -> Result<AxialField, RunError> {

@@ -109,6 +109,8 @@ impl ErrorTarget {
 pub struct Tolerances {
     /// One coil alone, its field at the target.
     pub coil: f64,
+    /// Its force on the magnet there.
+    pub coil_force: f64,
     /// The flux density in its core: its largest value and its mean.
     pub core_field: f64,
     /// The field at points.
@@ -153,6 +155,7 @@ impl Tolerances {
         let or = |default: f64| requested.unwrap_or(default);
         Self {
             coil: or(of_core(KERNEL_ERROR)),
+            coil_force: or(of_core(forces_in_air)),
             core_field: match core.map(|core| &core.material) {
                 Some(Material::Curve(_)) => or(CORE_FIELD_TOLERANCE).max(CORE_FIELD_TOLERANCE),
                 Some(Material::Linear(_)) | None => or(CORE_FIELD_TOLERANCE),
@@ -230,6 +233,7 @@ mod tests {
             let all = of(more, Some(7e-3));
             let Tolerances {
                 coil,
+                coil_force,
                 core_field,
                 field,
                 forces,
@@ -239,6 +243,7 @@ mod tests {
             } = all;
             let stages = [
                 coil,
+                coil_force,
                 core_field,
                 field,
                 forces,
@@ -246,7 +251,7 @@ mod tests {
                 inductances,
                 working_point,
             ];
-            assert_eq!(stages, [7e-3; 7]);
+            assert_eq!(stages, [7e-3; 8]);
         }
         // Linearisation at a working point leaves more than a finer one.
         assert_eq!(of("", Some(1.3e-7)).working_point, WORKING_POINT_TOLERANCE);

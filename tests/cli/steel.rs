@@ -337,6 +337,46 @@ fn a_probe_reports_the_force_on_the_magnet() {
         .says(&["magnet"]);
 }
 
+/// Regression: `evaluate` stated no error of the force on a cylinder, which was off by 9e-6 at a tolerance of 0.1;
+/// `probe` passed over a tolerance that its force misses, and refused a place for the height of another.
+#[test]
+fn the_force_on_a_cylinder_has_an_error_that_its_tolerance_governs() {
+    let place = Place::new();
+    place.write(
+        "wide.toml",
+        "name = \"wide\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 100\n[wire]\n\
+         diameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 1\n[magnet]\ndiameter_mm = 40\nlength_mm = 10\n\
+         model = \"cylinder\"\ntilt_deg = [0, 90]\n[supply]\ncurrent_max_a = 1\n[target]\nheight_mm = 25\n",
+    );
+    let evaluated = |tolerance: &str| {
+        let args = ["evaluate", "wide.toml", "--tolerance", tolerance];
+        let found = place.run(&[&args[..], &["--format", "json"]].concat());
+        let found = found.ends(0).json();
+        let force = found["target"]["force_vector_n"][0].as_f64().unwrap();
+        (force, found["accuracy"]["force"]["estimate"].as_f64())
+    };
+    let (sure, _) = evaluated("1e-5");
+    for tolerance in ["0.1", "0.001"] {
+        let (force, stated) = evaluated(tolerance);
+        // The largest gradient over the magnet gives at least this force.
+        let off = (force / sure - 1.0).abs();
+        let stated = stated.expect("an error of the force");
+        assert!(off <= stated && stated < 100.0 * off, "{off:e} {stated:e}");
+    }
+    let probe = |points: &str, tolerance: &str| {
+        let args = ["probe", "wide.toml", "-", "--magnet-force"];
+        let points = format!("x_m,y_m,z_m\n{points}\n");
+        place.run_with_input(&[&args[..], &["--tolerance", tolerance]].concat(), &points)
+    };
+    probe("0,0,0.04", "1e-8").ends(0);
+    probe("0,0,0.04", "1e-12").ends(4).says(&["E403", "force"]);
+    // A power of two of the gap below, the magnet's dipoles would be too many.
+    probe("0,0,0.05\n0,0,0.0233", "1e-3").ends(0);
+    probe("0,0,0.05\n0,0,0.01", "1e-3")
+        .ends(3)
+        .says(&["point 2", "centre 10 mm", "-10 mm from"]);
+}
+
 /// Two coils of the shipped design, as `design.toml`.
 fn two_coils(place: &Place) {
     let text = String::from_utf8(place.read(CORED)).unwrap();

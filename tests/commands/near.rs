@@ -167,7 +167,7 @@ fn the_claimed_error_of_a_force_over_cores_covers_it_without_the_weights() {
             let exact = forces(&table(&design, &points, tight, true), columns);
             for point in 0..points.len() {
                 let coarse = table(&design, &points[point..=point], loose, true);
-                let claimed = coarse.force_error.expect("a force");
+                let claimed = coarse.force.as_ref().expect("a force").estimate;
                 let (force, size) = forces(&coarse, columns)[0];
                 let off = (0..3).map(|i| (force[i] - exact[point].0[i]).abs());
                 let off = off.fold(0.0, f64::max) / (MOMENT_A_M2 * size);

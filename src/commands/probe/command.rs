@@ -215,10 +215,7 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
         "|grad B| at the point"
     };
     let field = stage(table.relative_error, relative_to, &table.method);
-    let force = table.force_error.map(|estimate| {
-        let to = "the moment times the largest |grad B| at the point's height";
-        ("force", stage(estimate, to, &table.force_method))
-    });
+    let force = table.force.clone().map(|stage| ("force", stage));
     let iron = table.iron_error.map(|estimate| {
         let to = "|B| of the nearest coil at the point";
         let how = "difference from the next coarser panels at up to 24 of the points, also beside and below the array, and what \

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::RunError;
-use crate::accuracy::{StageAccuracy, missed};
+use crate::accuracy::{StageAccuracy, missed, missed_of_force};
 use crate::bundle::table::{FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, write_samples};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
@@ -45,10 +45,8 @@ pub struct ProbeTable {
     pub iron_error: Option<f64>,
     /// What linear cores leave of their B-H curve, where coupled ones have one.
     pub linear_cores: Option<StageAccuracy>,
-    /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
-    pub force_error: Option<f64>,
-    /// How it is known.
-    pub force_method: String,
+    /// Of the forces, where requested.
+    pub force: Option<StageAccuracy>,
     /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
     /// Warnings for the user.
@@ -100,13 +98,12 @@ pub fn probe(
     let coils = scene.coils.len();
     let mut fields = vec![CartesianField::default(); points_m.len() * coils];
     let mut forces = vec![[0.0; 6]; if request.force { fields.len() } else { 0 }];
-    let (mut growth, mut evaluation) = (1.0_f64, 0.0_f64);
     let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
-    for group in groups.values() {
-        let rule = request
-            .force
-            .then(|| scene.magnet_rule(group.magnet_lowest_m, finest))
-            .transpose()?;
+    let groups = match request.force {
+        true => with_rules(&scene, groups, &points_m, finest)?,
+        false => groups.into_values().map(|group| (group, None)).collect(),
+    };
+    for (group, rule) in &groups {
         let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
         let places = FieldAt::of_group(&scene, &solved, group, &points_m, rule.as_ref())?;
         let portions = own
@@ -134,21 +131,18 @@ pub fn probe(
                 }
             }
         }
-        if let Some(rule) = &rule {
-            growth = growth.max(scene.magnet_growth(group.magnet_lowest_m));
-            let proven = solved.force_evaluation(rule.amplification(), rule.bound());
-            evaluation = evaluation.max(proven);
-        }
     }
     let iron_error = solved.iron_error(&points_m)?;
     progress.end();
-    let force_error = if request.force {
-        let proven = (growth, evaluation);
-        Some(force_error(&scene, &solved, &points_m, &forces, proven)?)
+    let mut accuracy_missed = missed([(&"field", &field_error(&solved))], solved.tolerance);
+    let force = if request.force {
+        let stage = force_error(&scene, &solved, &points_m, &forces, &groups)?;
+        let of_force = missed_of_force([(&"force", &stage)], scene.tolerances.forces);
+        accuracy_missed.extend(of_force);
+        Some(stage)
     } else {
         None
     };
-    let force_method = force_error.as_ref().map(|error| error.method.clone());
     Ok(ProbeTable {
         components: request.components,
         coils,
@@ -160,10 +154,9 @@ pub fn probe(
         relative_to_height: solved.has_steel(),
         iron_error,
         linear_cores: solved.linear_cores(),
-        force_error: force_error.map(|error| error.estimate),
-        force_method: force_method.unwrap_or_default(),
+        force,
         warnings: solved.above_knee(&scene).into_iter().collect(),
-        accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
+        accuracy_missed,
     })
 }
 
@@ -206,15 +199,22 @@ fn field_error(solved: &Solved) -> StageAccuracy {
     }
 }
 
-/// The error of the forces, [point, coil]: that of the steel, which grows by `growth` over the magnet, and
-/// of evaluating them, `evaluation` at most.
+/// The error of the forces, [point, coil]: that of the steel, which grows over the magnet, and of evaluating them.
 fn force_error(
     scene: &Scene,
     solved: &Solved,
     points_m: &[[f64; 3]],
     forces: &[[f64; 6]],
-    (growth, evaluation): (f64, f64),
-) -> Result<Evaluation, RunError> {
+    groups: &[(Group, Option<MagnetRule>)],
+) -> Result<StageAccuracy, RunError> {
+    let (mut growth, mut evaluation) = (1.0_f64, 0.0_f64);
+    for (group, rule) in groups {
+        if let Some(rule) = rule {
+            growth = growth.max(scene.magnet_growth(group.magnet_lowest_m));
+            let proven = solved.force_evaluation(rule.amplification(), rule.bound());
+            evaluation = evaluation.max(proven);
+        }
+    }
     let proven = Evaluation {
         estimate: evaluation,
         method: "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
@@ -223,9 +223,12 @@ fn force_error(
         let [x, y, z, ..] = forces[point * scene.coils.len() + coil];
         [x, y, z]
     };
-    let mut sampled = sharper_forces(scene, solved, points_m, given, proven)?;
-    sampled.estimate += solved.steel_error * growth;
-    Ok(sampled)
+    let sampled = sharper_forces(scene, solved, points_m, given, proven)?;
+    Ok(StageAccuracy {
+        estimate: sampled.estimate + solved.steel_error * growth,
+        relative_to: "the moment times the largest |grad B| at the point's height".to_owned(),
+        method: sampled.method,
+    })
 }
 
 /// Rows that are evaluated alike, whatever other rows there are.
@@ -267,6 +270,41 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Gro
         group.rows.push(row);
     }
     Ok(groups)
+}
+
+/// The groups with the dipoles that stand for the magnet there. Where a group's lowest height leaves too small a gap,
+/// every row of it has those of its own.
+///
+/// # Errors
+/// A magnet that touches the array, or is too close for the tolerance, with the number of its point.
+fn with_rules(
+    scene: &Scene,
+    groups: BTreeMap<[i32; 2], Group>,
+    points_m: &[[f64; 3]],
+    finest: f64,
+) -> Result<Vec<(Group, Option<MagnetRule>)>, RunError> {
+    let mut ready = Vec::new();
+    for group in groups.into_values() {
+        if let Ok(rule) = scene.magnet_rule(group.magnet_lowest_m, finest) {
+            ready.push((group, Some(rule)));
+            continue;
+        }
+        for &row in &group.rows {
+            let magnet_lowest_m = points_m[row][2];
+            let rule = scene.magnet_rule(magnet_lowest_m, finest);
+            let rule = rule.map_err(|fault| match fault {
+                RunError::Input(why) => RunError::Input(format!("point {}: {why}", row + 1)),
+                other => other,
+            })?;
+            let own = Group {
+                rows: vec![row],
+                magnet_lowest_m,
+                ..group
+            };
+            ready.push((own, Some(rule)));
+        }
+    }
+    Ok(ready)
 }
 
 /// The field of every coil at places within reach of the steel's sources.
