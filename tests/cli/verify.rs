@@ -303,6 +303,28 @@ fn a_pull_that_nodes_miss_verifies() {
     }
 }
 
+/// Regression: the one node of a map was held against what interpolation adds, which is nothing.
+#[test]
+fn a_map_of_one_node_verifies() {
+    let place = Place::new();
+    place.write(
+        "four.toml",
+        "name = \"four\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 60\n[wire]\n\
+         diameter_mm = 0.7\n[array]\nrows = 2\ncolumns = 2\npitch_mm = 50\n[workspace]\nx_mm = [0, 0, 1]\n\
+         y_mm = [5, 5, 1]\nz_mm = [20, 20, 1]\n",
+    );
+    place.write(
+        "dot.toml",
+        "name = \"dot\"\nprimitive = \"flat\"\nheight_mm = 20\n[points]\nx_mm = [0, 0, 1]\ny_mm = [5, 5, 1]\n",
+    );
+    // So low between the coils they pull: lambda is null, which a bundle may hold.
+    place
+        .run(&["calibrate", "four.toml", "dot.toml"])
+        .ends(4)
+        .says(&["E402"]);
+    place.run(&["verify", "results/four/dot"]).ends(0);
+}
+
 #[test]
 fn fresh_bundles_verify_whatever_was_requested() {
     for (name, [core, array, magnet, supply], args, code) in CASES {

@@ -130,6 +130,10 @@ pub(super) fn between(
     let [coils, nz, ny, nx] = map.shape();
     let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
     let nodes = nx * ny * nz;
+    // A single node has nothing beside it.
+    if nodes == 1 {
+        return Ok(Vec::new());
+    }
     let at = |nodes: &[f64], cell: usize, t: f64| match nodes.get(cell + 1) {
         Some(next) => nodes[cell] + t * (next - nodes[cell]),
         None => nodes[cell],
