@@ -205,25 +205,25 @@ impl MagnetRule {
         sources: Sources,
         tolerance: f64,
     ) -> Result<Self, NoRule> {
-        let distance_m = sources.distance_m();
-        let positive = [size.diameter_m, size.length_m, tolerance]
-            .iter()
-            .all(|v| v.is_finite() && *v > 0.0);
-        if !positive || distance_m.is_nan() || !moment_a_m2.iter().all(|v| v.is_finite()) {
-            return Err(NoRule::NotANumber);
-        }
-        let axis = direction(moment_a_m2);
-        let gap_m = sources.gap_m(size, axis);
-        if gap_m <= 0.0 {
-            return Err(NoRule::Touches { gap_m });
-        }
-        let cylinder = Placed {
-            size,
-            axis,
-            moment_a_m2,
-        };
-        axial::rule(&cylinder, distance_m, tolerance)
+        let (cylinder, gap_m) = Placed::new(size, moment_a_m2, sources, tolerance)?;
+        axial::rule(&cylinder, sources.distance_m(), tolerance)
             .or_else(|| solid::rule(&cylinder, sources, gap_m, tolerance))
+            .ok_or(NoRule::TooClose { gap_m, tolerance })
+    }
+
+    /// As [`MagnetRule::cylinder`], with nodes all over the magnet: more of them than on its axis alone, and errors of
+    /// the field hardly grow.
+    ///
+    /// # Errors
+    /// As [`MagnetRule::cylinder`].
+    pub fn throughout_cylinder(
+        size: Cylinder,
+        moment_a_m2: [f64; 3],
+        sources: Sources,
+        tolerance: f64,
+    ) -> Result<Self, NoRule> {
+        let (cylinder, gap_m) = Placed::new(size, moment_a_m2, sources, tolerance)?;
+        solid::rule(&cylinder, sources, gap_m, tolerance)
             .ok_or(NoRule::TooClose { gap_m, tolerance })
     }
 
@@ -346,6 +346,35 @@ struct Placed {
     size: Cylinder,
     axis: [f64; 3],
     moment_a_m2: [f64; 3],
+}
+
+impl Placed {
+    /// A cylinder clear of its sources, and its gap to them, m.
+    fn new(
+        size: Cylinder,
+        moment_a_m2: [f64; 3],
+        sources: Sources,
+        tolerance: f64,
+    ) -> Result<(Self, f64), NoRule> {
+        let positive = [size.diameter_m, size.length_m, tolerance]
+            .iter()
+            .all(|v| v.is_finite() && *v > 0.0);
+        let is_number = !sources.distance_m().is_nan() && moment_a_m2.iter().all(|v| v.is_finite());
+        if !positive || !is_number {
+            return Err(NoRule::NotANumber);
+        }
+        let axis = direction(moment_a_m2);
+        let gap_m = sources.gap_m(size, axis);
+        if gap_m <= 0.0 {
+            return Err(NoRule::Touches { gap_m });
+        }
+        let placed = Self {
+            size,
+            axis,
+            moment_a_m2,
+        };
+        Ok((placed, gap_m))
+    }
 }
 
 /// Unit vector along a moment; upright for none.

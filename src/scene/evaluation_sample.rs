@@ -12,9 +12,9 @@ use crate::numerics::spread::spread;
 use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
-pub(super) const SAFETY: f64 = 30.0;
+const SAFETY: f64 = 30.0;
 /// Least estimate: what rounding may do, sampled or not.
-pub(super) const ROUNDING: f64 = 8.0 * f64::EPSILON;
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Places at which values are compared, of all of them.
 const PLACES: usize = 48;
 /// Places at which values are compared above and beside the winding.

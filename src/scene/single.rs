@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 use super::core_material::{Material, SceneCore};
-use super::evaluation_sample::{FINER, ROUNDING, SAFETY};
+use super::evaluation_sample::FINER;
 use super::knee::{FOR_CORES, above_knee};
 use super::tolerances::MAGNET_FINEST;
 use super::{MAGNET_SHARE, Scene, at_current, passive};
@@ -14,7 +14,7 @@ use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::design::MagnetModel;
 use crate::field::frame::to_cartesian;
-use crate::field::magnet::{MagnetRule, Node};
+use crate::field::magnet::{Cylinder, MagnetRule, Node, Sources};
 use crate::field::steel::array_steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
@@ -438,8 +438,8 @@ impl Single {
         pairs.collect()
     }
 
-    /// The error of a force that `rule` gives: the field's, and the dipoles' by a hundred times finer ones where there
-    /// are such.
+    /// The error of a force that `rule` gives: the field's, and what is proven of the dipoles, by themselves or by the
+    /// difference from others throughout the magnet.
     fn force_stage(
         &self,
         scene: &Scene,
@@ -447,33 +447,42 @@ impl Single {
         (force_n, current_a): ([f64; 3], f64),
     ) -> Result<StageAccuracy, RunError> {
         let height_m = scene.design.target_height_m;
-        let field = self
-            .accuracy
-            .get("field")
-            .map_or(0.0, |stage| stage.estimate);
-        let [x, y, z] = scene.moment_a_m2;
-        let size_n = x.hypot(y).hypot(z) * (current_a * self.field.gradient_norm()).abs();
+        let size_n = {
+            let [x, y, z] = scene.moment_a_m2;
+            x.hypot(y).hypot(z) * (current_a * self.field.gradient_norm()).abs()
+        };
         // An error of the steel is smooth over the magnet; rounding is not.
-        let of_field = field + KERNEL_ERROR * rule.amplification();
-        let proven = of_field + rule.bound();
-        let (mut estimate, mut method) = (
-            proven,
-            "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
-        );
-        if let Ok(finer) = scene.magnet_rule(height_m, FINER * rule.bound()) {
-            let (_, gradients) = self.over(&finer, height_m, current_a)?;
-            let [x, y, z] = minus(finer.force_n(&gradients), force_n);
-            let sampled = of_field + SAFETY * x.hypot(y).hypot(z) / size_n + ROUNDING;
-            if sampled < estimate {
-                estimate = sampled;
-                method = format!(
-                    "the field's error, and {SAFETY} times the difference from a hundred times finer dipoles of the \
-                     magnet; proven below {proven:.1e}"
-                );
+        let proven = |rule: &MagnetRule| KERNEL_ERROR * rule.amplification() + rule.bound();
+        let mut of_rule = proven(rule);
+        let mut method = "the field's error and the a-priori bound of the magnet's dipoles";
+        let magnet = &scene.design.magnet;
+        let size = Cylinder {
+            diameter_m: magnet.diameter_m,
+            length_m: magnet.length_m,
+        };
+        let sources = Sources::Below {
+            height_m: height_m - scene.sources_top_m(),
+        };
+        let other = [FINER * rule.bound(), rule.bound()]
+            .into_iter()
+            .find_map(|to| {
+                MagnetRule::throughout_cylinder(size, scene.moment_a_m2, sources, to).ok()
+            });
+        if let Some(other) = other {
+            let (_, gradients) = self.over(&other, height_m, current_a)?;
+            let [x, y, z] = minus(other.force_n(&gradients), force_n);
+            let by_other = x.hypot(y).hypot(z) / size_n + proven(&other);
+            if by_other < of_rule {
+                of_rule = by_other;
+                method = "the field's error, the difference from dipoles throughout the magnet, and their a-priori bound";
             }
         }
-        let relative_to = "the moment times the largest |grad B| over the magnet";
-        Ok(stage(estimate, relative_to, &method))
+        let field = self.accuracy.get("field");
+        Ok(stage(
+            field.map_or(0.0, |field| field.estimate) + of_rule,
+            "the moment times the largest |grad B| over the magnet",
+            method,
+        ))
     }
 
     fn at(&self, r_m: f64, z_m: f64) -> Result<AxialField, RunError> {

@@ -342,12 +342,10 @@ fn a_probe_reports_the_force_on_the_magnet() {
 #[test]
 fn the_force_on_a_cylinder_has_an_error_that_its_tolerance_governs() {
     let place = Place::new();
-    place.write(
-        "wide.toml",
-        "name = \"wide\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 100\n[wire]\n\
-         diameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 1\n[magnet]\ndiameter_mm = 40\nlength_mm = 10\n\
-         model = \"cylinder\"\ntilt_deg = [0, 90]\n[supply]\ncurrent_max_a = 1\n[target]\nheight_mm = 25\n",
-    );
+    const WIDE: &str = "name = \"wide\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 100\n\
+        [wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 1\n[magnet]\ndiameter_mm = 40\nlength_mm = 10\n\
+        model = \"cylinder\"\ntilt_deg = [0, 90]\n[supply]\ncurrent_max_a = 1\n[target]\nheight_mm = 25\n";
+    place.write("wide.toml", WIDE);
     let evaluated = |tolerance: &str| {
         let args = ["evaluate", "wide.toml", "--tolerance", tolerance];
         let found = place.run(&[&args[..], &["--format", "json"]].concat());
@@ -361,8 +359,15 @@ fn the_force_on_a_cylinder_has_an_error_that_its_tolerance_governs() {
         // The largest gradient over the magnet gives at least this force.
         let off = (force / sure - 1.0).abs();
         let stated = stated.expect("an error of the force");
-        assert!(off <= stated && stated < 100.0 * off, "{off:e} {stated:e}");
+        assert!(off <= stated && stated < 1000.0 * off, "{off:e} {stated:e}");
     }
+    // Far off the dipoles lie on the magnet's axis, with large shares of both signs: rounding alone might exceed the
+    // default.
+    place.write(
+        "far.toml",
+        &WIDE.replace("height_mm = 25", "height_mm = 85"),
+    );
+    place.run(&["evaluate", "far.toml"]).ends(0);
     let probe = |points: &str, tolerance: &str| {
         let args = ["probe", "wide.toml", "-", "--magnet-force"];
         let points = format!("x_m,y_m,z_m\n{points}\n");
