@@ -50,6 +50,18 @@ pub fn interpolation_error(
     Ok(found[0])
 }
 
+/// What an error at the height `z_m` is relative to: the largest value there, or on the planes of nodes around it where
+/// that is smaller, since a runtime knows no other. `nodes` are their heights and the largest value of each plane.
+#[must_use]
+pub fn error_scale(there: f64, nodes: (&[f64], &[f64]), z_m: f64) -> f64 {
+    let (heights_m, largest) = nodes;
+    let near = largest[lagrange::around(heights_m, z_m)].iter();
+    match near.copied().fold(0.0, f64::max) {
+        near if near > 0.0 => there.min(near),
+        _ => there,
+    }
+}
+
 /// The middles of cells, faces and edges in the layers that decide; of a few cells their quarters too.
 fn staggered(grid: &Grid) -> [Grid; 7] {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
@@ -164,11 +176,7 @@ pub fn interpolation_errors_by(
                         size = size.max(direct.abs());
                     }
                 }
-                let near = &on_nodes[lagrange::around(z, places.z_m[k])];
-                let near = near.iter().copied().fold(0.0, f64::max);
-                if near > 0.0 {
-                    size = size.min(near);
-                }
+                let size = error_scale(size, (z, on_nodes), places.z_m[k]);
                 if size > 0.0 {
                     worst.largest = worst.largest.max(SAFETY * error / size);
                 }

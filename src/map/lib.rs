@@ -46,5 +46,7 @@ pub mod multipole_fit;
 pub mod radii;
 pub mod tabulate;
 
-pub use interpolation::{InterpolationError, interpolation_error, interpolation_errors_by};
+pub use interpolation::{
+    InterpolationError, error_scale, interpolation_error, interpolation_errors_by,
+};
 pub use tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil, tabulate};

@@ -87,6 +87,18 @@ pub fn moment_a_m2(design: &Design) -> [f64; 3] {
     dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg)
 }
 
+/// The magnet's size where it counts; `None` for a dipole.
+pub(crate) fn cylinder_of(design: &Design) -> Option<Cylinder> {
+    let magnet = &design.magnet;
+    match magnet.model {
+        MagnetModel::Dipole => None,
+        MagnetModel::Cylinder => Some(Cylinder {
+            diameter_m: magnet.diameter_m,
+            length_m: magnet.length_m,
+        }),
+    }
+}
+
 /// The dipoles that stand for the magnet at heights from `lowest_m` up, where nothing that
 /// attracts it lies above `top_m`.
 ///
@@ -98,14 +110,9 @@ pub(crate) fn magnet_rule(
     top_m: f64,
     tolerance: f64,
 ) -> Result<MagnetRule, RunError> {
-    let magnet = &design.magnet;
     let moment_a_m2 = moment_a_m2(design);
-    if magnet.model == MagnetModel::Dipole {
+    let Some(size) = cylinder_of(design) else {
         return Ok(MagnetRule::dipole(moment_a_m2));
-    }
-    let size = Cylinder {
-        diameter_m: magnet.diameter_m,
-        length_m: magnet.length_m,
     };
     let sources = Sources::Below {
         height_m: lowest_m - top_m,
@@ -259,15 +266,7 @@ impl<'a> Scene<'a> {
     /// How far below its centre the magnet extends, m; 0 for a dipole.
     #[must_use]
     pub fn magnet_depth_m(&self) -> f64 {
-        let magnet = &self.design.magnet;
-        match magnet.model {
-            MagnetModel::Dipole => 0.0,
-            MagnetModel::Cylinder => Cylinder {
-                diameter_m: magnet.diameter_m,
-                length_m: magnet.length_m,
-            }
-            .depth_along_m(self.moment_a_m2),
-        }
+        cylinder_of(self.design).map_or(0.0, |size| size.depth_along_m(self.moment_a_m2))
     }
 
     /// Whether the moment is tilted, so that the force needs the whole gradient.
@@ -294,16 +293,8 @@ impl<'a> Scene<'a> {
     /// `height_m` high; 1 for a dipole.
     #[must_use]
     pub fn magnet_growth(&self, height_m: f64) -> f64 {
-        let magnet = &self.design.magnet;
-        let top_m = self.sources_top_m();
-        match magnet.model {
-            MagnetModel::Dipole => 1.0,
-            MagnetModel::Cylinder => Cylinder {
-                diameter_m: magnet.diameter_m,
-                length_m: magnet.length_m,
-            }
-            .growth_along(height_m - top_m, self.moment_a_m2),
-        }
+        let above_m = height_m - self.sources_top_m();
+        cylinder_of(self.design).map_or(1.0, |size| size.growth_along(above_m, self.moment_a_m2))
     }
 
     /// Height of the highest winding or steel, m.

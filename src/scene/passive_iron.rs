@@ -3,11 +3,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::Scene;
 use super::iron::SceneIron;
 use super::passive_table::{Layout, Table, axial_m, symmetries_of};
+use super::{Scene, cylinder_of};
 use crate::RunError;
-use crate::design::MagnetModel;
+
 use crate::field::iron::passive::IronPull;
 use crate::field::magnet::Cylinder;
 use crate::field::steel::passive::magnet::PassiveMagnet;
@@ -196,12 +196,7 @@ impl RegionPull {
 
 /// Moment and, where it is not a point, size of the magnet.
 pub(super) fn magnet_of(scene: &Scene) -> ([f64; 3], Option<Cylinder>) {
-    let magnet = &scene.design.magnet;
-    let size = (magnet.model == MagnetModel::Cylinder).then_some(Cylinder {
-        diameter_m: magnet.diameter_m,
-        length_m: magnet.length_m,
-    });
-    (scene.moment_a_m2, size)
+    (scene.moment_a_m2, cylinder_of(scene.design))
 }
 
 pub(super) fn too_close(region: Region, fault: NoPull) -> RunError {

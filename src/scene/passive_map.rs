@@ -10,6 +10,7 @@ use super::passive::{self, Pull};
 use super::passive_table::{Layout, Table, axial_m, symmetries_of};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
+use crate::map::error_scale;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange;
 
@@ -213,11 +214,7 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
                 }
             }
             samples += plane;
-            let near = largest(&levels[lagrange::around(z, *z_m)]);
-            let size = match largest(exact) {
-                size if near > 0.0 => size.min(near),
-                size => size,
-            };
+            let size = error_scale(largest(exact), (z, &levels), *z_m);
             if size > 0.0 {
                 worst = worst.max(SAFETY * error / size);
             }

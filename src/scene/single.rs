@@ -8,13 +8,13 @@ use super::core_material::{Material, SceneCore};
 use super::evaluation_sample::FINER;
 use super::knee::{FOR_CORES, above_knee};
 use super::tolerances::MAGNET_FINEST;
-use super::{MAGNET_SHARE, Scene, at_current, passive};
+use super::{MAGNET_SHARE, Scene, at_current, cylinder_of, passive};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::design::MagnetModel;
 use crate::field::frame::to_cartesian;
-use crate::field::magnet::{Cylinder, MagnetRule, Node, Sources};
+use crate::field::magnet::{MagnetRule, Node, Sources};
 use crate::field::steel::array_steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
@@ -455,20 +455,14 @@ impl Single {
         let proven = |rule: &MagnetRule| KERNEL_ERROR * rule.amplification() + rule.bound();
         let mut of_rule = proven(rule);
         let mut method = "the field's error and the a-priori bound of the magnet's dipoles";
-        let magnet = &scene.design.magnet;
-        let size = Cylinder {
-            diameter_m: magnet.diameter_m,
-            length_m: magnet.length_m,
-        };
         let sources = Sources::Below {
             height_m: height_m - scene.sources_top_m(),
         };
-        let other = [FINER * rule.bound(), rule.bound()]
-            .into_iter()
-            .find_map(|to| {
-                MagnetRule::throughout_cylinder(size, scene.moment_a_m2, sources, to).ok()
-            });
-        if let Some(other) = other {
+        let throughout = |tolerance| {
+            let size = cylinder_of(scene.design)?;
+            MagnetRule::throughout_cylinder(size, scene.moment_a_m2, sources, tolerance).ok()
+        };
+        if let Some(other) = throughout(FINER * rule.bound()).or_else(|| throughout(rule.bound())) {
             let (_, gradients) = self.over(&other, height_m, current_a)?;
             let [x, y, z] = minus(other.force_n(&gradients), force_n);
             let by_other = x.hypot(y).hypot(z) / size_n + proven(&other);

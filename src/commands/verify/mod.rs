@@ -427,7 +427,7 @@ impl Bounds {
             between: claimed.between.map(|error| error.min(BETWEEN_MAX)),
             pull: claimed.pull.min(CLAIMED_MAX),
             pull_map: claimed.pull_map.min(CLAIMED_MAX),
-            pull_between: claimed.pull_between.min(BETWEEN_MAX),
+            pull_between: claimed.pull_between.min(1.0),
         }
     }
 }
