@@ -4,8 +4,11 @@ use super::Scene;
 use super::core_material::SceneCore;
 use crate::RunError;
 use crate::field::steel::bh_curve::BhCurve;
-use crate::field::steel::linear_equivalent::LinearEquivalent;
+use crate::field::steel::linear_equivalent::{GradientDifferences, LinearEquivalent};
 use crate::field::steel::saturated_coil::{CoilWithCurve, SaturatedCoil, SaturatedCoilError};
+
+/// Tolerance of the core at smaller currents, whose difference is a bound.
+const SMALLER_TOLERANCE: f64 = 1e-3;
 
 /// The coil of `scene` at `current_a` along `curve`, to `tolerance` from `height_m` up, or as far
 /// as the refinements carry.
@@ -47,6 +50,35 @@ pub(crate) fn linear(
     let first = mean_permeability(curve, state);
     let height_m = scene.design.target_height_m;
     Ok(coil(scene, core, curve).linear_equivalent(state, first, height_m)?)
+}
+
+/// Share of the knee's flux density that smaller currents are aimed at.
+const BELOW_KNEE: f64 = 0.5;
+/// Solutions until a core is below its knee, at most; one or two are usual.
+const MOST_SMALLER: usize = 8;
+
+/// How much more than `state`, which is above the steel's knee at `current_a`, the core gives per ampere at currents that
+/// leave it below.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn below_knee(
+    scene: &Scene,
+    core: &SceneCore,
+    curve: &BhCurve,
+    (state, current_a): (&SaturatedCoil, f64),
+    height_m: f64,
+) -> Result<GradientDifferences, RunError> {
+    let (mut below, mut smaller_a) = (state.clone(), current_a);
+    for _ in 0..MOST_SMALLER {
+        // |B| grows less than the current: this is above what it is aimed at, at times above the knee.
+        smaller_a *= BELOW_KNEE * core.knee_t / below.inside.peak_b_t;
+        below = solve(scene, core, curve, smaller_a, SMALLER_TOLERANCE, height_m)?;
+        if below.inside.peak_b_t <= core.knee_t {
+            break;
+        }
+    }
+    Ok(coil(scene, core, curve).gradient_differences(state, &below.layer)?)
 }
 
 /// The curve's permeability at the mean |B| of `state`.

@@ -1,5 +1,8 @@
 //! The documents that a command reads, with their entries among the inputs.
 
+use std::collections::BTreeSet;
+
+use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::design::Design;
 use crate::shape::document::ShapeDocument;
@@ -22,6 +25,19 @@ pub struct ShapeSource {
     pub document: ShapeDocument,
     /// Path as given, digest; `None` for a surface given with flags.
     pub input: Option<Input>,
+}
+
+/// # Errors
+/// Two shapes of one name.
+pub fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
+    let mut names = BTreeSet::new();
+    match shapes.iter().find(|s| !names.insert(&s.document.name)) {
+        None => Ok(()),
+        Some(shape) => Err(RunError::Input(format!(
+            "two shapes are called {:?}, and results go by that; rename one",
+            shape.document.name
+        ))),
+    }
 }
 
 /// How points are chosen.

@@ -16,7 +16,9 @@ use crate::field::steel::array::CoupledArray;
 use crate::field::steel::array_request::{ArrayRequest, DriveCache, NoCache};
 use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
 use crate::field::steel::cored_coil::CoredCoil;
-use crate::field::steel::linear_equivalent::{AGAINST_THE_CURVE, LinearEquivalent};
+use crate::field::steel::linear_equivalent::{
+    AGAINST_THE_CURVE, GradientDifferences, LinearEquivalent,
+};
 use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::spread::spread;
@@ -32,6 +34,12 @@ const STEEL_SHARE: f64 = 0.45;
 
 /// The stage that states what linear cores leave of their B-H curve.
 pub(crate) const LINEAR_CORES: &str = "linear_cores";
+/// The one that states what a core above its knee gives more per ampere at smaller currents.
+pub(crate) const SMALLER_CURRENTS: &str = "smaller_currents";
+
+/// How it is known what smaller currents give.
+const AT_SMALLER_CURRENTS: &str = "the largest difference of a core at a current that leaves it below the steel's knee \
+                                   from itself at the largest current of a coil, alone and per ampere";
 
 /// How the error of linear cores in the place of those along a curve is known.
 const TWO_OF_LINEAR_CORES: &str = "the difference of two resolutions of the coupled cores, which are linear: what that \
@@ -66,6 +74,15 @@ impl Steel {
     }
 }
 
+/// A core above its steel's knee at the largest current.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct AboveKnee {
+    /// The largest |B|, T.
+    peak_t: f64,
+    /// What it gives more per ampere at currents that leave it below the knee.
+    smaller_currents: GradientDifferences,
+}
+
 /// A scene's field sources, ready to be evaluated.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
@@ -83,9 +100,9 @@ pub struct Solved {
     linear: Option<LinearEquivalent>,
     /// The height that it was solved from, m.
     lowest_m: f64,
-    /// The largest |B| in a core at that current, T, where it is above the steel's knee.
+    /// What a core does that is above the steel's knee at that current.
     #[serde(default)]
-    above_knee_t: Option<f64>,
+    above_knee: Option<AboveKnee>,
     /// The field as it was last prepared.
     #[serde(skip)]
     prepared: PreparedField,
@@ -102,7 +119,7 @@ impl Solved {
             relative_permeability: 1.0,
             linear: None,
             lowest_m: f64::NEG_INFINITY,
-            above_knee_t: None,
+            above_knee: None,
             prepared: PreparedField::default(),
         }
     }
@@ -110,7 +127,7 @@ impl Solved {
     /// A sentence on forces per ampere that hold at the currents of saturated cores alone.
     #[must_use]
     pub fn above_knee(&self, scene: &Scene) -> Option<String> {
-        let (peak_t, core) = self.above_knee_t.zip(scene.core.as_ref())?;
+        let (above, core) = self.above_knee.as_ref().zip(scene.core.as_ref())?;
         let linear = self.linear_cores().map_or_else(String::new, |stage| {
             format!(
                 "; coupled cores are taken as linear: one alone is up to {:.2} % off the B-H curve, among neighbours it \
@@ -119,25 +136,41 @@ impl Solved {
             )
         });
         Some(format!(
-            "the core at {} A reaches {peak_t:.2} T, above the steel's knee at {:.2} T: forces per ampere are those \
-             at that current; smaller currents give more, and forces of several do not add up: set \
+            "the core at {} A reaches {:.2} T, above the steel's knee at {:.2} T: forces per ampere are those at \
+             that current; smaller currents give up to {:.0} % more, and forces of several do not add up: set \
              supply.current_max_a near the currents used{linear}",
             most_current_a(scene),
-            core.knee_t
+            above.peak_t,
+            core.knee_t,
+            100.0 * above.smaller_currents.largest_from(self.lowest_m)
         ))
     }
 
     /// How far the gradients of linear cores are from those of cores along their B-H curve; `None` where none are in
     /// their place.
+    fn linear_cores(&self) -> Option<StageAccuracy> {
+        Some(self.of_curve(&self.linear.as_ref()?.gradient, AGAINST_THE_CURVE))
+    }
+
+    /// What the forces per ampere leave of a B-H curve, by the stages' names: those of linear cores, and those of smaller
+    /// currents where the core is above its knee.
     ///
-    /// It is what the model leaves, which no tolerance changes: a stage of its own.
-    #[must_use]
-    pub fn linear_cores(&self) -> Option<StageAccuracy> {
-        Some(StageAccuracy {
-            estimate: self.linear.as_ref()?.gradient_error(self.lowest_m),
+    /// It is what the model leaves, which no tolerance changes: stages of their own.
+    pub fn curve_stages(&self) -> impl Iterator<Item = (&'static str, StageAccuracy)> {
+        let linear = self.linear_cores().map(|stage| (LINEAR_CORES, stage));
+        let smaller = self.above_knee.as_ref().map(|above| {
+            let stage = self.of_curve(&above.smaller_currents, AT_SMALLER_CURRENTS);
+            (SMALLER_CURRENTS, stage)
+        });
+        linear.into_iter().chain(smaller)
+    }
+
+    fn of_curve(&self, differences: &GradientDifferences, method: &str) -> StageAccuracy {
+        StageAccuracy {
+            estimate: differences.largest_from(self.lowest_m),
             relative_to: "the largest |grad B| at a height".to_owned(),
-            method: AGAINST_THE_CURVE.to_owned(),
-        })
+            method: method.to_owned(),
+        }
     }
 
     /// The same of the flux linkage.
@@ -427,9 +460,9 @@ pub(super) fn solve_with(
     };
     let along_curve = along_curve(scene, core, tolerance, lowest_m)?;
     let relative_permeability = permeability(core, along_curve.as_ref());
-    let peak_t = along_curve.as_ref().map(|of| of.state.inside.peak_b_t);
-    let above_knee_t = peak_t.filter(|peak_t| *peak_t > core.knee_t);
-    let linear = along_curve.as_ref().and_then(|of| of.linear.clone());
+    let of_curve = along_curve.as_ref();
+    let above_knee = of_curve.and_then(|of| of.above_knee.clone());
+    let linear = of_curve.and_then(|of| of.linear.clone());
     let solved = |steel, steel_error| Solved {
         steel,
         tolerance,
@@ -437,7 +470,7 @@ pub(super) fn solve_with(
         relative_permeability,
         linear,
         lowest_m,
-        above_knee_t,
+        above_knee,
         prepared: PreparedField::default(),
     };
     if coupled(scene.design) {
@@ -495,6 +528,7 @@ struct AlongCurve {
     state: SaturatedCoil,
     /// What is taken for it where cores are coupled.
     linear: Option<LinearEquivalent>,
+    above_knee: Option<AboveKnee>,
     relative_permeability: f64,
 }
 
@@ -518,7 +552,18 @@ fn along_curve(
     let linear = coupled(scene.design)
         .then(|| at_current::linear(scene, core, curve, &state))
         .transpose()?;
+    let peak_t = state.inside.peak_b_t;
+    let above_knee = if peak_t > core.knee_t {
+        let at_most = (&state, current_a);
+        Some(AboveKnee {
+            peak_t,
+            smaller_currents: at_current::below_knee(scene, core, curve, at_most, lowest_m)?,
+        })
+    } else {
+        None
+    };
     Ok(Some(AlongCurve {
+        above_knee,
         relative_permeability: linear.as_ref().map_or_else(
             || at_current::mean_permeability(curve, &state),
             |linear| linear.relative_permeability,
@@ -599,7 +644,7 @@ fn solve_iron(
         relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
         linear: None,
         lowest_m,
-        above_knee_t: None,
+        above_knee: None,
         prepared: PreparedField::default(),
     })
 }

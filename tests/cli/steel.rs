@@ -646,3 +646,50 @@ fn a_body_of_the_permeability_of_air_has_no_largest_field() {
         "{shown}"
     );
 }
+
+/// Forces that `replay` gave by cores saturated at the largest current were 30 % too small at smaller ones, beside a stated
+/// error of 1e-4.
+#[test]
+fn regression_replay_took_smaller_currents_for_the_largest() {
+    let place = Place::new();
+    place.write(
+        "flat.toml",
+        "name = \"flat\"\nprimitive = \"flat\"\nheight_mm = 30\nside_mm = 20\n[points]\n\
+         x_mm = [-10.0, 10.0, 9]\ny_mm = [-10.0, 10.0, 9]\n",
+    );
+    let workspace = "[workspace]\nx_mm = [-10, 10, 9]\ny_mm = [-10, 10, 9]\nz_mm = [20, 40, 9]\n";
+    saturated(&place, workspace, "current_max_a = 20");
+    let args = ["calibrate", "saturated.toml", "flat.toml", "--out", "b"];
+    place
+        .run(&[&args[..], &["--no-report"]].concat())
+        .ends(0)
+        .says(&["smaller currents give up to"]);
+    place.write("t.csv", "t_s,x_m,y_m,z_m\n0,0,0,0.025\n0.1,0.002,0,0.028\n");
+    let args = ["replay", "b/t/flat", "t.csv", "--out", "r.csv"];
+    let args = [&args[..], &["--format", "json"]].concat();
+    let replayed = place.run(&args).ends(0);
+    let stated = replayed.json()["accuracy"]["force"]["estimate"].as_f64();
+    let stated = stated.expect("an error of the force");
+    let table = place.text("r.csv");
+    let mut rows = csv::Reader::from_reader(table.as_bytes());
+    let rows: Vec<std::collections::HashMap<String, String>> =
+        rows.deserialize().map(|row| row.expect("a row")).collect();
+    let mut worst = 0.0_f64;
+    for row in rows {
+        let number = |name: &str| row[name].parse::<f64>().expect("a number");
+        let current_a = number("current_0_a");
+        assert!(current_a < 19.0, "{current_a}");
+        saturated(&place, "", &format!("current_max_a = {current_a}"));
+        let [x, y, z] = ["x_m", "y_m", "z_m"].map(number);
+        place.write("at.csv", &format!("x_m,y_m,z_m\n{x},{y},{z}\n"));
+        let args = ["probe", "saturated.toml", "at.csv", "--magnet-force"];
+        let probed = place.run(&[&args[..], &["--format", "json"]].concat());
+        let per_a = probed.ends(0).json()["columns"]["force_z_n_per_a"][0].clone();
+        let force_n = per_a.as_f64().expect("a force") * current_a;
+        worst = worst.max((force_n - number("force_n")).abs());
+    }
+    assert!(worst > 0.1, "saturated: {worst} N");
+    assert!(stated > worst && stated < 10.0 * worst, "{stated} {worst}");
+    let warnings = replayed.json()["warnings"].to_string();
+    assert!(warnings.contains("smaller ones give up to"), "{warnings}");
+}

@@ -1,7 +1,6 @@
 //! `calibrate`: map, points and lambda for each shape, one bundle each.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -41,7 +40,7 @@ use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::shard::Shard;
-use crate::scene::sources::{DesignSource, ShapeSource};
+use crate::scene::sources::{DesignSource, ShapeSource, check_names};
 use crate::scene::steel::Solved;
 use crate::shape::points::ConstraintPoints;
 
@@ -319,19 +318,6 @@ fn check_reach(design: &Design, options: &CalibrateOptions) -> Result<(), RunErr
         1e3 * options.reach_m,
         1e3 * sensor_m
     )))
-}
-
-/// # Errors
-/// Two shapes of one name.
-fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
-    let mut names = BTreeSet::new();
-    match shapes.iter().find(|s| !names.insert(&s.document.name)) {
-        None => Ok(()),
-        Some(shape) => Err(RunError::Input(format!(
-            "two shapes are called {:?}: their bundles would share a folder; rename one",
-            shape.document.name
-        ))),
-    }
 }
 
 /// The field that earlier runs cached, unless the options are against that.

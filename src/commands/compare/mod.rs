@@ -29,9 +29,9 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
 use crate::scene::passive::{self, Pull};
-use crate::scene::sources::ShapeSource;
+use crate::scene::sources::{ShapeSource, check_names};
 use crate::scene::steel;
-use crate::scene::steel::{LINEAR_CORES, Solved};
+use crate::scene::steel::Solved;
 use crate::units::DETECTION_THRESHOLD_N;
 
 pub(crate) mod command;
@@ -264,11 +264,12 @@ pub fn run(
         })
         .collect::<Result<Vec<Object>, RunError>>()?;
     warnings.extend(of_steel(&scene));
+    warnings.extend(solved.above_knee(&scene));
     let fields = fields(&scene, &objects, progress)?;
     let stage = proven_accuracy(&scene, &solved);
     let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
     let mut accuracy = BTreeMap::from([("forces", stage), ("difference", of_difference(error))]);
-    accuracy.extend(solved.linear_cores().map(|stage| (LINEAR_CORES, stage)));
+    accuracy.extend(solved.curve_stages());
     Ok(CompareReport {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -319,19 +320,6 @@ fn of_steel(scene: &Scene) -> Vec<String> {
         );
     }
     warnings
-}
-
-/// # Errors
-/// Two shapes of one name.
-fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
-    for (i, shape) in shapes.iter().enumerate() {
-        let name = &shape.document.name;
-        if shapes[..i].iter().any(|other| other.document.name == *name) {
-            let message = format!("two shapes are called {name:?}: rename one");
-            return Err(RunError::Input(message));
-        }
-    }
-    Ok(())
 }
 
 impl Object {

@@ -52,7 +52,7 @@ use crate::scene::knee::{FOR_CORES, above_knee};
 use crate::scene::passive;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
-use crate::scene::steel::{LINEAR_CORES, Solved};
+use crate::scene::steel::Solved;
 use crate::shape::document::ShapeDocument;
 use crate::uncertainty::UncertaintyOverride;
 use crate::units::FAINT_FORCE_N;
@@ -628,9 +628,9 @@ impl PosedProblem<'_> {
             warnings.extend(warning.map(|warning| format!("--at: {warning}")));
         }
         file.accuracy.extend(self.points.stages());
-        let linear = self.solved.linear_cores();
+        let of_curve = self.solved.curve_stages();
         file.accuracy
-            .extend(linear.map(|stage| (LINEAR_CORES.to_owned(), stage)));
+            .extend(of_curve.map(|(name, stage)| (name.to_owned(), stage)));
         let effects = self.effects_of_points(file.lambda_n_per_m, progress)?;
         file.accuracy.extend(effects);
         let headline = self.headline(&file, progress)?;

@@ -35,7 +35,7 @@ use crate::plot::slices::SlicesPlot;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::maps::{MagnetMean, SceneMap};
-use crate::scene::steel::{self, LINEAR_CORES, Solved};
+use crate::scene::steel::{self, Solved};
 use crate::scene::tolerances::ErrorTarget;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 
@@ -356,8 +356,8 @@ impl Made {
         let together = self.together.as_ref();
         let stage = together.map(|t| ("working_point".to_owned(), t.accuracy.clone()));
         accuracy.extend(stage);
-        let linear = self.solved.linear_cores();
-        accuracy.extend(linear.map(|stage| (LINEAR_CORES.to_owned(), stage)));
+        let of_curve = self.solved.curve_stages();
+        accuracy.extend(of_curve.map(|(name, stage)| (name.to_owned(), stage)));
         let vfield = self.vector_field.as_ref().map(|made| &made.accuracy);
         let mpem = self.multipoles.as_ref().map(|made| &made.accuracy);
         for (names, stages) in [

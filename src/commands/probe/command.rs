@@ -28,7 +28,6 @@ use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::field::components::Components;
 use crate::scene::cost::{of_probe, of_steel};
-use crate::scene::steel::LINEAR_CORES;
 
 /// How every table of points begins.
 const HEADER: &str = "x_m,y_m,z_m,coil,";
@@ -222,10 +221,9 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
                    the solver and the evaluation leave";
         ("iron_at_points", stage(estimate, to, how))
     });
-    let linear = table.linear_cores.clone();
-    let linear = linear.map(|stage| (LINEAR_CORES, stage));
-    let all = [Some(("field", field)), iron, force, linear];
-    all.into_iter().flatten().collect()
+    let all = [Some(("field", field)), iron, force];
+    let of_curve = table.of_curve.iter().cloned();
+    all.into_iter().flatten().chain(of_curve).collect()
 }
 
 /// The table's columns by their names: its CSV read back, every number to the last bit.

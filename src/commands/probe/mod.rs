@@ -43,8 +43,8 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// With steel of any shape the estimated error of B at some of the points, relative to |B| there.
     pub iron_error: Option<f64>,
-    /// What linear cores leave of their B-H curve, where coupled ones have one.
-    pub linear_cores: Option<StageAccuracy>,
+    /// What the field per ampere leaves of the cores' B-H curve, by the stages' names.
+    pub of_curve: Vec<(&'static str, StageAccuracy)>,
     /// Of the forces, where requested.
     pub force: Option<StageAccuracy>,
     /// The stages that miss the tolerance.
@@ -153,7 +153,7 @@ pub fn probe(
         method: solved.point_method(),
         relative_to_height: solved.has_steel(),
         iron_error,
-        linear_cores: solved.linear_cores(),
+        of_curve: solved.curve_stages().collect(),
         force,
         warnings: solved.above_knee(&scene).into_iter().collect(),
         accuracy_missed,

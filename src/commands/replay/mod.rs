@@ -28,6 +28,7 @@ use crate::design::{Design, Driver, Need};
 use crate::lambda::two_fingers::FingerMagnet;
 use crate::progress::Progress;
 use crate::scene::finger_magnet;
+use crate::scene::steel::SMALLER_CURRENTS;
 use felt::Felt;
 use follow::{Follower, Steps};
 use page::Below;
@@ -170,6 +171,17 @@ impl Opened {
         Some(Felt::new(study.given, ohm, positions))
     }
 
+    /// A sentence where smaller currents give more force per ampere than the bundle's.
+    fn of_smaller_currents(&self) -> Option<String> {
+        let stage = self.bundle.manifest.accuracy.get(SMALLER_CURRENTS)?;
+        Some(format!(
+            "the forces per ampere are those of cores above their steel's knee, at the largest currents: smaller ones give \
+             up to {:.0} % more, which the stated error of the forces allows for; set supply.current_max_a near the \
+             currents used and calibrate again",
+            100.0 * stage.estimate
+        ))
+    }
+
     /// The circuit of the bundle's coils, without current.
     fn drive(&self) -> Result<Drive, RunError> {
         let name = self.bundle.folder.display();
@@ -233,7 +245,10 @@ pub fn run(
     }
     let mut drive = dynamics.then(|| opened.drive()).transpose()?;
     let bandwidth_hz = opened.bandwidth_hz();
-    let warnings = plausible::warnings(trajectory, &ends_m);
+    let warnings = plausible::warnings(trajectory, &ends_m)
+        .into_iter()
+        .chain(opened.of_smaller_currents())
+        .collect();
     progress.take_seconds();
     let coils = renderer.coils();
     let mut steps: Vec<Steps> = Vec::with_capacity(trajectory.len());

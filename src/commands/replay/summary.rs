@@ -15,6 +15,7 @@ use crate::bundle::trajectory::Trajectory;
 use crate::coil::circuit::farthest_from_zero;
 use crate::coil::drive::Drive;
 use crate::force_direction::ForceDirection;
+use crate::scene::steel::{LINEAR_CORES, SMALLER_CURRENTS};
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
@@ -276,6 +277,10 @@ impl Followed {
 pub(super) struct Bounds {
     /// Of the force per ampere, relative to the largest at the height.
     relative: f64,
+    /// What smaller currents give more of it.
+    smaller_currents: f64,
+    /// The currents that the forces per ampere hold at, at most, A.
+    most_a: f64,
     /// Of the unpowered steel's pull, N.
     passive_n: f64,
     /// The largest of the force, N.
@@ -287,13 +292,14 @@ pub(super) struct Bounds {
 impl Bounds {
     pub(super) fn of(bundle: &Bundle) -> Self {
         let manifest = &bundle.manifest;
-        let stated = manifest
-            .accuracy
-            .get("map")
-            .map_or(0.0, |stage| stage.estimate);
+        let stage = |name: &str| manifest.accuracy.get(name).map_or(0.0, |of| of.estimate);
+        let runtime = &bundle.map.runtime;
+        let limits_a = runtime.current_min_a.iter().chain(&runtime.current_max_a);
         let passive = manifest.map.passive_force.as_ref();
         Self {
-            relative: manifest.map.interpolation.largest_error + stated,
+            relative: manifest.map.interpolation.largest_error + stage("map") + stage(LINEAR_CORES),
+            smaller_currents: stage(SMALLER_CURRENTS),
+            most_a: limits_a.fold(0.0, |most, limit| most.max(limit.abs())),
             passive_n: passive.map_or(0.0, |p| p.interpolation.largest_error * p.largest_n.abs()),
             force_n: 0.0,
             certificate: 0.0,
@@ -302,8 +308,13 @@ impl Bounds {
 
     /// A position with its currents, where `largest_n_per_a` is the largest force per ampere.
     pub(super) fn add(&mut self, certificate: f64, largest_n_per_a: f64, currents_a: &[f64]) {
-        let sum: f64 = currents_a.iter().map(|current| current.abs()).sum();
-        let bound = self.relative * largest_n_per_a * sum + self.passive_n;
+        let sizes_a = currents_a.iter().map(|current| current.abs());
+        let off_a = sizes_a.map(|size_a| {
+            // Along the curve a smaller current gives no more force than a larger one.
+            let left_a = (self.most_a - size_a).max(0.0);
+            self.relative * size_a + (self.smaller_currents * size_a).min(left_a)
+        });
+        let bound = largest_n_per_a * off_a.sum::<f64>() + self.passive_n;
         self.force_n = self.force_n.max(bound);
         self.certificate = self.certificate.max(certificate);
     }
@@ -327,8 +338,8 @@ impl Bounds {
                 stage(
                     self.force_n,
                     "absolute, N: the largest over the positions",
-                    "the map's stated errors, at and between its nodes, times the largest force \
-                     per ampere at the height and the sum of the currents' sizes",
+                    "the map's stated errors, at and between its nodes, and what it leaves of the cores' B-H curve, \
+                     times the largest force per ampere at the height and the sum of the currents' sizes",
                 ),
             ),
             (

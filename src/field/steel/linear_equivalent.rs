@@ -42,19 +42,26 @@ pub struct LinearEquivalent {
     pub relative_permeability: f64,
     /// Difference of its flux linkage, relative to the one along the curve.
     pub flux_error: f64,
-    /// Heights, m, ascending, and the largest difference of gradients at each, relative to the largest |grad B| there.
-    gradient_errors: Vec<[f64; 2]>,
+    /// Differences of its gradients from those of the one along the curve.
+    pub gradient: GradientDifferences,
 }
 
-impl LinearEquivalent {
-    /// The largest difference of gradients from `lowest_m` up, relative to the largest |grad B| at a height; closer to
-    /// the core than a tenth of its radius none is known.
+/// How far the gradients of one core are from those of another, at heights above both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GradientDifferences(
+    /// Heights, m, ascending, and the largest difference at each, relative to the largest |grad B| there.
+    Vec<[f64; 2]>,
+);
+
+impl GradientDifferences {
+    /// The largest from `lowest_m` up, relative to the largest |grad B| at a height; closer to the core than a tenth of
+    /// its radius none is known.
     #[must_use]
-    pub fn gradient_error(&self, lowest_m: f64) -> f64 {
-        let errors = &self.gradient_errors;
-        let above = errors.partition_point(|[z_m, _]| *z_m <= lowest_m);
-        let from = &errors[above.saturating_sub(1)..];
-        from.iter().fold(0.0, |most, [_, error]| most.max(*error))
+    pub fn largest_from(&self, lowest_m: f64) -> f64 {
+        let above = self.0.partition_point(|[z_m, _]| *z_m <= lowest_m);
+        let from = &self.0[above.saturating_sub(1)..];
+        from.iter()
+            .fold(0.0, |most, [_, differs]| most.max(*differs))
     }
 }
 
@@ -119,18 +126,30 @@ impl CoilWithCurve<'_> {
             expected.dbz_dz / core.at(x).0.field(0.0, height_m).dbz_dz - 1.0
         });
         let (layer, added_h) = core.at(x);
-        let gradient_errors = (0..HEIGHTS).map(|step| {
-            let above_m = (self.closest_m() - self.shape.top_m) * f64::from(step).exp2();
-            let z_m = self.shape.top_m + above_m;
-            let differs = self.gradient_difference(along, &layer, z_m, &ACROSS)?;
-            Ok([z_m, differs + state.relative_error])
-        });
         Ok(LinearEquivalent {
             relative_permeability: permeability(x),
             flux_error: self.flux_difference(state.added_inductance_h, added_h)
                 + state.relative_error,
-            gradient_errors: gradient_errors.collect::<Result<_, OnEdge>>()?,
+            gradient: self.gradient_differences(state, &layer)?,
         })
+    }
+
+    /// How far the gradients per ampere of the core `layer` are from those of `state`, whose own error is added.
+    ///
+    /// # Errors
+    /// A place on the winding's edge.
+    pub fn gradient_differences(
+        &self,
+        state: &SaturatedCoil,
+        layer: &MagnetizedCore,
+    ) -> Result<GradientDifferences, OnEdge> {
+        let at = (0..HEIGHTS).map(|step| {
+            let above_m = (self.closest_m() - self.shape.top_m) * f64::from(step).exp2();
+            let z_m = self.shape.top_m + above_m;
+            let differs = self.gradient_difference(&state.layer, layer, z_m, &ACROSS)?;
+            Ok([z_m, differs + state.relative_error])
+        });
+        Ok(GradientDifferences(at.collect::<Result<_, OnEdge>>()?))
     }
 }
 

@@ -188,13 +188,13 @@ fn the_linear_core_of_a_curve_has_its_gradient_at_one_height() {
         assert!(at_target < 1e-5, "{current_a} A: {at_target:e}");
         for z_m in [0.002, 0.004, 0.013, 0.03, 0.06, 0.2] {
             let worst = off(&[0.0, 0.004, 0.009, 0.012, 0.018], z_m);
-            let stated = found.gradient_error(z_m);
+            let stated = found.gradient.largest_from(z_m);
             assert!(
                 worst <= stated,
                 "{current_a} A, {z_m} m: {worst:e} {stated:e}"
             );
         }
-        assert!(found.gradient_error(0.01) < found.gradient_error(0.0));
+        assert!(found.gradient.largest_from(0.01) < found.gradient.largest_from(0.0));
         let flux = (core.added_inductance_h - state.added_inductance_h).abs();
         let flux = flux / (coil.air_inductance_h + state.added_inductance_h);
         assert!(flux <= found.flux_error, "{flux:e} {}", found.flux_error);

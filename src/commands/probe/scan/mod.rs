@@ -19,7 +19,7 @@ use crate::numerics::least_squares::CUTOFF;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
-use crate::scene::steel::{LINEAR_CORES, Solved};
+use crate::scene::steel::Solved;
 
 pub(crate) mod command;
 mod explain;
@@ -289,9 +289,8 @@ fn accuracy(solved: &Solved, estimate: f64) -> BTreeMap<String, StageAccuracy> {
         relative_to: "the largest field and gradient of the scan".to_owned(),
         method: solved.point_method(),
     };
-    let linear = solved.linear_cores();
     let all = [("field", field)].into_iter();
-    all.chain(linear.map(|stage| (LINEAR_CORES, stage)))
+    all.chain(solved.curve_stages())
         .map(|(name, stage)| (name.to_owned(), stage))
         .collect()
 }
