@@ -362,3 +362,41 @@ fn regression_the_error_of_a_strip_too_narrow_to_compare_was_nan() {
     assert!(stated >= 1.0, "{stated}");
     assert_eq!(run["headline"]["budget"][0]["part"], "points");
 }
+
+/// Against the least force over half of the points, without a border of the object: a hundred times too large and more.
+#[test]
+fn regression_the_largest_force_at_every_point_was_stated_far_off() {
+    let place = Place::new();
+    let found = |shape: &str, samples: usize| {
+        let axis = format!("[-50, 50, {samples}]");
+        let text = format!("name = \"s\"\n{shape}\n[points]\nx_mm = {axis}\ny_mm = {axis}\n");
+        place.write("s.toml", &text);
+        let args = [
+            "lambda",
+            "designs/seed_air.toml",
+            "s.toml",
+            "--criterion",
+            "maxmin",
+        ];
+        let result = place.run(&[&args[..], &["--format", "json"]].concat());
+        let result = result.ends(0).json();
+        let number = |path: &str| result.pointer(path).and_then(|of| of.as_f64());
+        let lambda = number("/lambda_n_per_m").expect("a force constant");
+        (
+            lambda,
+            number("/accuracy/lambda_of_points/estimate").expect("an error"),
+        )
+    };
+    let flat = "primitive = \"flat\"\nheight_mm = 50\nside_mm = 100";
+    for (shape, most) in [("primitive = \"wedge\"", 3e-3), (flat, 2e-3)] {
+        let (exact, _) = found(shape, 121);
+        for samples in [16, 25, 31] {
+            let (lambda, stated) = found(shape, samples);
+            let off = (lambda / exact - 1.0).abs();
+            assert!(
+                off < stated && stated < most,
+                "{shape} {samples}: {off:e} {stated:e}"
+            );
+        }
+    }
+}
