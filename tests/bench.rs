@@ -349,6 +349,27 @@ fn points_graded_to_a_deviation_are_swept_instead() {
     );
 }
 
+/// The refined run of coarse deviations was taken for exact: settings were within a hundredth that were not.
+#[test]
+fn regression_a_graded_reference_had_no_error() {
+    let place = place(ARRAY);
+    let reference = |deviation: &str| {
+        let arguments = [&ASKED[..], &["--force", "--max-deviation", deviation]].concat();
+        measured(&place, &arguments).shapes.remove(0).reference
+    };
+    let exact = reference("0.05mm");
+    for deviation in ["1mm", "4mm"] {
+        let coarse = reference(deviation);
+        let off = (coarse.lambda_n_per_m / exact.lambda_n_per_m - 1.0).abs();
+        let stated = coarse.lambda_error.expect("an error");
+        assert!(
+            off < stated && stated < 0.1,
+            "{deviation}: {off:e} {stated:e}"
+        );
+        assert!(coarse.how.contains("points graded to"), "{}", coarse.how);
+    }
+}
+
 /// The coarsest grid of bench's own had no point on the pad, and was called the user's.
 #[test]
 fn a_setting_whose_points_miss_the_object_is_left_out() {
@@ -377,6 +398,23 @@ fn bad_input_is_refused_before_anything_is_measured() {
         .ends(3)
         .says(&["outside", "[workspace]"]);
     assert!(!place.path("b").exists());
+}
+
+/// Another's file and two shapes of one name were refused when all had been measured, which was lost.
+#[test]
+fn regression_outputs_were_refused_after_the_measurement() {
+    let place = place(ARRAY);
+    let twice = [&["small.toml", "dome.toml"], &ASKED[1..]].concat();
+    bench(&place, &twice)
+        .ends(3)
+        .says(&["two shapes are called", "rename one"]);
+    assert!(!place.path("b").exists());
+    for name in ["bench.csv", "dome_felt.svg"] {
+        place.write(&format!("b/{name}"), "mine");
+        let refused = bench(&place, &ASKED).ends(4);
+        assert!(!refused.err.contains("will take"), "{}", refused.err);
+        assert_eq!(place.text(&format!("b/{name}")), "mine");
+    }
 }
 
 /// The steel was solved for all nodes, in minutes, before one of them was refused.

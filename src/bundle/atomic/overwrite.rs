@@ -164,13 +164,19 @@ impl Overwrite {
         &self.inputs
     }
 
-    /// Refuses when `target`, which exists, must not be replaced. Call it before a long computation
-    /// too; writing checks again.
+    /// Refuses when `target`, which exists, must not be replaced, or its folder, which exists, not be written to. Call it
+    /// before a long computation too; writing checks again.
     ///
     /// # Errors
-    /// [`WriteError::OutputExists`], [`WriteError::Protected`], [`WriteError::IsFolder`].
+    /// [`WriteError::OutputExists`], [`WriteError::Protected`], [`WriteError::IsFolder`]; the system's.
     pub fn check(&self, target: &Path) -> Result<(), WriteError> {
-        self.permit(target, None).map(drop)
+        self.permit(target, None)?;
+        let fail = |error| WriteError::from_io("write", target, error);
+        match Dir::open(parent_of(&real(target).map_err(fail)?)) {
+            Ok(folder) => folder.writable().map_err(fail),
+            // It is made, or the system says then why not.
+            Err(_) => Ok(()),
+        }
     }
 
     /// How a file of these bytes takes its place at `target`; without bytes, as far as can be known.

@@ -85,6 +85,24 @@ pub enum Points {
     },
 }
 
+impl Points {
+    /// Those of a graded deviation twice as large.
+    pub fn coarser(self) -> Option<Self> {
+        match self {
+            Self::Grid(_) => None,
+            Self::Graded {
+                max_deviation_m,
+                lowest_m,
+                widest_m,
+            } => Some(Self::Graded {
+                max_deviation_m: 2.0 * max_deviation_m,
+                lowest_m,
+                widest_m: widest_m.map(|widest_m| 2.0 * widest_m),
+            }),
+        }
+    }
+}
+
 /// Points of one setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointsRung {
@@ -151,7 +169,8 @@ impl Ladders {
         }
     }
 
-    /// The points of the refined run: twice as fine as the finest of the ladder.
+    /// The points of the refined run: on a grid twice as fine as the finest of the ladder where that has points enough to
+    /// interpolate, else its own.
     pub fn refined_points(&self) -> Points {
         match self.points[self.points.len() - 1].points {
             Points::Grid(samples) => Points::Grid(samples.map(|n| scaled(n, 2.0))),

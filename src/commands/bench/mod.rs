@@ -33,7 +33,7 @@ use crate::lambda::{Criterion, Solution};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::coupled;
-use crate::scene::sources::ShapeSource;
+use crate::scene::sources::{ShapeSource, check_names};
 
 /// The errors for which the cheapest settings are named.
 pub const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
@@ -86,6 +86,7 @@ pub fn run(
     announce: &dyn Fn(Estimate),
     progress: &dyn Progress,
 ) -> Result<BenchFile, RunError> {
+    check_names(request.shapes)?;
     let inputs = inputs(request);
     output::check(&inputs, request)?;
     let mut file = measure(request, inputs, announce, progress)?;
@@ -265,18 +266,17 @@ fn felt_error(
 /// The cheapest of `runs` whose error, with that of the reference, is within `target`.
 fn cheapest(
     target: f64,
-    own_error: Option<f64>,
+    own_error: f64,
     runs: &[Run],
     knobs: &[crate::bundle::bench::Knob],
 ) -> Cheapest {
     let by = |value: fn(&Run) -> f64| {
         move |a: &(usize, &Run), b: &(usize, &Run)| value(a.1).total_cmp(&value(b.1))
     };
-    let own = own_error.unwrap_or(0.0);
     let good = runs
         .iter()
         .enumerate()
-        .filter(|(_, run)| run.error() + own <= target);
+        .filter(|(_, run)| run.error() + own_error <= target);
     let found = good.min_by(by(|run| run.cpu_s));
     let met = found.is_some();
     let chosen = found.or_else(|| runs.iter().enumerate().min_by(by(Run::error)));

@@ -1,7 +1,7 @@
 //! The files of a run: table, pictures, page, and the JSON that states all.
 
 use super::BenchRequest;
-use super::page::{PAGE, html, pictures};
+use super::page::{PAGE, html, picture_names, pictures};
 use serde::Serialize;
 
 use crate::RunError;
@@ -92,7 +92,14 @@ pub fn made_with(request: &BenchRequest) -> Options {
 /// # Errors
 /// An output of something else.
 pub fn check(inputs: &[Input], request: &BenchRequest) -> Result<(), RunError> {
-    Ok(overwrite(inputs, request).check(&request.out.join(JSON))?)
+    let overwrite = overwrite(inputs, request);
+    let shapes = request.shapes.iter();
+    let pictures = shapes.flat_map(|shape| picture_names(&shape.document.name));
+    let others = [JSON, TABLE, PAGE].map(str::to_owned);
+    for name in others.into_iter().chain(pictures) {
+        overwrite.check(&request.out.join(name))?;
+    }
+    Ok(())
 }
 
 /// Writes all files; `files` lists them but for the JSON itself.

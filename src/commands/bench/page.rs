@@ -38,14 +38,16 @@ const SHOWN: [Shown; 2] = [
 /// The pictures: name of the file and SVG.
 #[must_use]
 pub fn pictures(file: &BenchFile) -> Vec<(String, String)> {
-    let shapes = file.shapes.iter();
-    shapes
-        .flat_map(|shape| SHOWN.iter().map(move |shown| (shape, shown)))
-        .map(|(shape, shown)| {
-            let name = format!("{}_{}.svg", shape.shape, shown.name);
-            (name, picture(shape, shown).drawing().svg())
-        })
-        .collect()
+    let of_shape = |shape: &ShapeBench| {
+        let drawn = SHOWN.map(|shown| picture(shape, &shown).drawing().svg());
+        picture_names(&shape.shape).into_iter().zip(drawn)
+    };
+    file.shapes.iter().flat_map(of_shape).collect()
+}
+
+/// The names of the pictures of a shape.
+pub fn picture_names(shape: &str) -> [String; SHOWN.len()] {
+    SHOWN.map(|shown| format!("{shape}_{}.svg", shown.name))
 }
 
 fn picture(shape: &ShapeBench, shown: &Shown) -> CurvesPlot {

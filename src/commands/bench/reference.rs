@@ -1,12 +1,13 @@
 //! The run that all others are held against: finer in every knob.
 
 use super::clock::Watch;
-use super::ladder::Ladders;
+use super::ladder::{Ladders, Points};
 use super::places::{Chosen, choose};
 use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
-use crate::commands::lambda::ForcesAt;
+use crate::commands::lambda::{ForcePoints, ForcesAt};
+use crate::design::message_text::number;
 use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring, lowest_requested_m};
 use crate::map::FieldMap;
@@ -31,6 +32,9 @@ const CLEARLY_LESS: f64 = 1.0 / 3.0;
 /// What is left of that change at most: of errors that fall to a third, a half. The stated ones often fall by more
 /// than the true ones, so their ratio itself is not relied on.
 const LEFT_OF_CHANGE: f64 = 0.5;
+
+/// Of what points graded half as finely change: an error that falls with the deviation is as large as that.
+const MARGIN_OF_GRADED: f64 = 1.6;
 
 /// The refined field beside the present one, which shows what it may still be off by.
 struct Fields {
@@ -160,8 +164,9 @@ pub struct Refined {
     /// All of them.
     pub solution: Solution,
     /// Its own error, about.
-    pub own_error: Option<f64>,
+    pub own_error: f64,
     tolerance: f64,
+    chosen: Points,
     points: usize,
     cpu_s: f64,
     in_air: bool,
@@ -176,6 +181,16 @@ struct Rows {
 }
 
 impl Rows {
+    fn new(fields: &Fields, bench: &Bench, points: &ForcePoints) -> Result<Self, RunError> {
+        let pull = passive::counted(bench.scene, &points.positions_m)?;
+        Ok(Self {
+            forces: fields.forces(bench, &points.positions_m)?,
+            height_m: points.height_m.clone(),
+            offset_n: pull.map(|pull| pull.forces_z_n(&points.positions_m)),
+            weights: Some(points.areas.clone()),
+        })
+    }
+
     fn problem<'a>(&'a self, scene: &'a Scene, resistance_ohm: &'a [f64]) -> ForceProblem<'a> {
         ForceProblem {
             forces_n_per_a: &self.forces.n_per_a,
@@ -215,17 +230,9 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     let tightest = scene.tolerances.map;
     let in_air = !scene.design.has_steel();
     let fields = Fields::new(bench, refined_tolerance(in_air, tightest))?;
-    let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
-    let forces = fields.forces(bench, &points.positions_m)?;
-    let pull = passive::counted(scene, &points.positions_m)?;
-    let offset_n = pull.map(|pull| pull.forces_z_n(&points.positions_m));
-    let weights = Some(points.areas.clone());
-    let all = Rows {
-        forces,
-        height_m: points.height_m.clone(),
-        offset_n,
-        weights,
-    };
+    let finest = ladders.refined_points();
+    let points = bench.points(&shape.document, finest, &Silent)?;
+    let all = Rows::new(&fields, bench, &points)?;
     let resistance_ohm = scene.resistances_ohm();
     let problem = all.problem(scene, &resistance_ohm);
     let options = bench.request.lambda.with_jnd_of(&problem)?;
@@ -239,7 +246,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
         ))
     })?;
     let (lambda_n_per_m, _) = chosen;
-    let of_points = points.error_against_limit(
+    let against_limit = points.error_against_limit(
         lambda_n_per_m,
         (&problem, &problem),
         (&Wiring::default(), settings),
@@ -250,6 +257,17 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
             progress: &bench.within(),
         },
     )?;
+    let of_points = match (against_limit, finest.coarser()) {
+        (Some(error), _) => error,
+        (None, Some(coarser)) => {
+            let points = bench.points(&shape.document, coarser, &Silent)?;
+            let rows = Rows::new(&fields, bench, &points)?;
+            let constant = lambda::constant(&rows.problem(scene, &resistance_ohm), settings)?;
+            let change = |constant: f64| (constant / lambda_n_per_m - 1.0).abs();
+            MARGIN_OF_GRADED * constant.map_or(1.0, change)
+        }
+        (None, None) => 1.0,
+    };
     let of_field = all.forces.off.of_constant(&problem, settings, chosen)?;
     let Chosen {
         position_m,
@@ -267,9 +285,10 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
     Ok(Refined {
         places,
         lambda_n_per_m,
-        own_error: of_points.map(|of_points| of_points + of_field),
+        own_error: of_points + of_field,
         solution,
         tolerance: fields.refined.tolerance,
+        chosen: finest,
         points: points.height_m.len(),
         cpu_s: watch.processor_s(),
         in_air,
@@ -284,20 +303,25 @@ impl Refined {
         } else {
             "the field to a tenth of the present tolerance or less".to_owned()
         };
+        let points = match self.chosen {
+            Points::Grid([x, y]) => format!("a grid of {x} x {y} points"),
+            Points::Graded {
+                max_deviation_m, ..
+            } => format!("points graded to {} mm", number(1e3 * max_deviation_m)),
+        };
         let left_out = match self.places.out_of_reach {
             0 => String::new(),
             more => format!("; {more} places that no map reaches are left out"),
         };
         Reference {
             how: format!(
-                "{field}; points twice as fine along each axis as the finest of the sweep, weighted by \
-                 the area they stand for; the felt force without a map, computed at the places directly{left_out}"
+                "{field}; {points}, weighted by the area they stand for; the felt force without a map, computed at the places directly{left_out}"
             ),
             tolerance: self.tolerance,
             points: self.points as u64,
             places: self.places.position_m.len() as u64,
             lambda_n_per_m: self.lambda_n_per_m,
-            lambda_error: self.own_error,
+            lambda_error: Some(self.own_error),
             cpu_s: self.cpu_s,
         }
     }
