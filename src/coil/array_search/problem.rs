@@ -115,6 +115,8 @@ pub struct Bounded {
     slack: f64,
     /// By how much a search must stay below the limit, or above it.
     margin: f64,
+    /// Excess that a search takes for none: every design has it.
+    unavoidable: f64,
 }
 
 impl Bounded {
@@ -129,6 +131,7 @@ impl Bounded {
             scale: None,
             slack: 0.0,
             margin: MARGIN,
+            unavoidable: 0.0,
         }
     }
 
@@ -176,7 +179,7 @@ impl Bounded {
 
     /// What a search takes for the excess: above [`MET`] where the limit is broken, or may be once lengths are rounded.
     fn judged(&self) -> f64 {
-        let excess = self.excess() + self.margin;
+        let excess = self.excess() + self.margin - self.unavoidable;
         match self.ends_range() {
             true => excess.max(FIRM * excess),
             false => excess,
@@ -234,6 +237,8 @@ pub struct ArrayProblem<'a> {
     room: Room,
     /// Limits that are no part of the search, by key: those that all designs of all choices meet or break alike.
     left_out: Vec<&'static str>,
+    /// Those that no sample of a search met, and the least that one broke them by.
+    unavoidable: RwLock<Vec<(&'static str, f64)>>,
     /// The correction of the search's outputs to full accuracy.
     correction: RwLock<Vec<f64>>,
     /// Samples that were computed to full accuracy, by their variables; `None` where there is no such design.
@@ -257,6 +262,7 @@ impl<'a> ArrayProblem<'a> {
             reference_ln: reference.iter().map(|merit| merit.ln()).collect(),
             room,
             left_out: Vec::new(),
+            unavoidable: RwLock::default(),
             correction: RwLock::default(),
             known: RwLock::default(),
         }
@@ -265,6 +271,41 @@ impl<'a> ArrayProblem<'a> {
     /// Takes the limits of this key out of the search.
     pub(super) fn leave_out(&mut self, key: &'static str) {
         self.left_out.push(key);
+    }
+
+    /// Where limits are met by no sample of `search`, the least that one breaks each by counts for nothing from now on: so
+    /// that others count which can be met. Whether there are such limits.
+    pub(super) fn give_up_unmet(&self, search: &Search<'_>) -> bool {
+        let mut least: Option<Vec<Bounded>> = None;
+        for sample in search.samples() {
+            let Some(physical) = self.properties(sample) else {
+                continue;
+            };
+            let bounds = self.bounds(&sample.x, Some(&physical));
+            if !in_ranges(&bounds) {
+                continue;
+            }
+            let known = least.get_or_insert_with(|| bounds.clone());
+            known.retain_mut(|known| {
+                let of_key =
+                    |bound: &&Bounded| bound.key == known.key && bound.at_least == known.at_least;
+                let bound = bounds.iter().find(of_key);
+                if let Some(bound) = bound.filter(|bound| bound.excess() < known.excess()) {
+                    *known = *bound;
+                }
+                known.excess() > MET && !known.ends_range()
+            });
+        }
+        let unmet = least.into_iter().flatten();
+        // What is left shows that they are broken.
+        let unmet = unmet.map(|bound| (bound.key, bound.excess() - 2.0 * MET));
+        let unmet: Vec<_> = unmet.filter(|(_, excess)| *excess > 0.0).collect();
+        let found = !unmet.is_empty();
+        *self
+            .unavoidable
+            .write()
+            .unwrap_or_else(PoisonError::into_inner) = unmet;
+        found
     }
 
     /// Takes them in again.
@@ -448,8 +489,12 @@ impl<'a> ArrayProblem<'a> {
         add_plate(&design, &mut all);
         self.add_height(x, &mut all);
         all.retain(|bound| !self.left_out.contains(&bound.key));
+        let unavoidable = self.unavoidable.read();
+        let unavoidable = unavoidable.unwrap_or_else(PoisonError::into_inner);
         for bound in &mut all {
             bound.margin = self.margin(x, bound);
+            let of_key = unavoidable.iter().find(|(key, _)| *key == bound.key);
+            bound.unavoidable = of_key.map_or(0.0, |(_, excess)| *excess);
         }
         all
     }

@@ -629,6 +629,10 @@ fn accept(
     search: &mut Search,
     given: Option<&Design>,
 ) -> Result<Option<Candidate>, Interrupted> {
+    if problem.give_up_unmet(search) {
+        search.allow(search.samples().len() + CORRECTING);
+        search.refine()?;
+    }
     let mut best: Option<Candidate> = None;
     for _ in 0..CORRECTIONS {
         let Some((sample, _)) = problem.best(search) else {

@@ -12,6 +12,7 @@ use super::search::{Found, Request, problems, run};
 use super::study::study;
 use crate::circuit;
 use crate::inductance::self_inductance_h;
+use crate::limits::UsedPower;
 
 /// The force of one coil in air on its axis, over the height.
 struct OnAxis;
@@ -564,4 +565,51 @@ fn regression_the_one_bore_that_holds_all_layers_was_passed_over() {
         // 8 layers of 1.2 mm are 19.2 mm, and 4.8 mm is the least bore of that wire.
         assert_eq!(found.best.x, [4.8, 8.0, 8.0], "{most}");
     }
+}
+
+/// On the axis, with the heat of every design alike.
+struct Heated;
+
+impl Physics for Heated {
+    fn compute(
+        &self,
+        design: &Design,
+        raised_m: f64,
+        level: Level,
+    ) -> Result<Option<Physical>, Interrupted> {
+        let one = OnAxis.compute(design, raised_m, level)?;
+        Ok(one.map(|one| Physical {
+            used: UsedPower {
+                static_w: Some(10.0),
+                feedback_w: None,
+            },
+            ..one
+        }))
+    }
+}
+
+/// Where every design broke one limit, others counted only beyond the share by which that one was broken: the result
+/// broke two, the given design one.
+#[test]
+fn regression_a_limit_that_no_design_meets_hid_the_others() {
+    let text = "name = 'one'\n[coil]\ninner_diameter_mm = 20.0\nouter_diameter_mm = 34.0\nlength_mm = 20.0\n\
+                [wire]\ndiameter_mm = 0.7\n[limits]\nstatic_power_max_w = 5.0\narray_mass_max_kg = 0.15\n\
+                [search]\ncoil.length_mm = [10.0, 60.0]\n";
+    let (design, _) =
+        Design::from_toml(text, Path::new("one.toml"), Need::OPTIMIZE).expect("a design");
+    let all = problems(&design, &request(), &[1.0], &Heated)
+        .expect("a search")
+        .all;
+    let found = run(&all, &design, &request())
+        .expect("not interrupted")
+        .expect("a design");
+    let broken = found.best.bounds.iter().filter(|bound| !bound.is_met());
+    let broken: Vec<&str> = broken.map(|bound| bound.key).collect();
+    assert_eq!(broken, ["static_power_w"], "{:?}", found.best.bounds);
+    let mass = found.best.bounds.iter().find(|b| b.key == "array_mass_kg");
+    let mass = mass.expect("limited").value;
+    assert!(
+        mass > 0.145,
+        "the limit that can be met is used up: {mass} kg"
+    );
 }

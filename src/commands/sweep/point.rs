@@ -157,6 +157,7 @@ impl Sweep<'_> {
             Vec::new(),
             &request,
             &physics,
+            &|_| (),
             &Silent,
         )?;
         match found.status {

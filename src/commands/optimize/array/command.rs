@@ -157,14 +157,31 @@ impl ArrayFlags {
         let physics = ArrayPhysics::new(&shapes, self.aim()?, shared.tolerance, &bar)?;
         physics.remember(self.earlier()?);
         let request = self.request(shared, shapes.len())?;
-        printer.notice(&estimate(&design, &physics, &request));
+        // Of a plate and other bodies no law is known: the given design is measured.
+        let is_measured = design.has_iron();
+        let said = |measured_s| printer.notice(&estimate(&design, &physics, &request, measured_s));
+        if is_measured {
+            printer.notice(
+                "the given design is computed first, with its plate and other bodies; how long the search takes is \
+                 said then",
+            );
+        } else {
+            said(0.0);
+        }
+        let announce = |measured_s| {
+            if is_measured {
+                said(measured_s);
+            }
+        };
         let source = Document {
             design: &design,
             text: &text,
             path,
         };
         let ended = self.keeping(&outputs, &physics, || {
-            optimize_array(&source, &shapes, inputs, &request, &physics, &bar)
+            optimize_array(
+                &source, &shapes, inputs, &request, &physics, &announce, &bar,
+            )
         });
         let arrays = physics.journal();
         let seconds = bar.take_seconds();
@@ -476,8 +493,13 @@ fn vary(text: &str) -> Result<(String, toml::Value), String> {
 const CLIMB_S: f64 = 3e-3;
 
 /// The computation that follows, stated first: every number of coils where each is searched to its end, else the
-/// costliest of them.
-fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> String {
+/// costliest of them. The given design took `measured_s`, as far as that is known, and no array is taken for cheaper.
+fn estimate(
+    design: &Design,
+    physics: &ArrayPhysics,
+    request: &ArrayRequest,
+    measured_s: f64,
+) -> String {
     let choices = choices(design, &design.search);
     let spaces = choices
         .iter()
@@ -494,7 +516,7 @@ fn estimate(design: &Design, physics: &ArrayPhysics, request: &ArrayRequest) -> 
     for space in spaces {
         let known: &mut f64 = each_cpu_s.entry(space.coils()).or_default();
         variables = variables.max(space.variables().len());
-        *known = known.max(cpu_s(space));
+        *known = known.max(cpu_s(space)).max(measured_s);
     }
     let costliest = each_cpu_s.values().copied().fold(0.0, f64::max);
     let (ends, ends_cpu_s) = match request.every_count {

@@ -26,6 +26,7 @@ use crate::coil::array_search::search::{
 };
 use crate::coil::array_search::study::{Study, study};
 use crate::coil::limits::{self, LimitCheck};
+use crate::commands::bench::clock::Watch;
 use crate::commands::evaluate::evaluate;
 use crate::design::message_text::{number, twelve_digits};
 use crate::design::search::SearchKey;
@@ -60,6 +61,8 @@ const MOSTLY_MISSING: f64 = 0.5;
 /// The merit of every shape with the given design, at both levels.
 struct Before {
     search: Physical,
+    /// Processor time that it took at the accuracy of the search, s.
+    search_cpu_s: f64,
     full: Physical,
 }
 
@@ -96,7 +99,8 @@ pub(crate) fn settling_in_array(
     Ok((design, text))
 }
 
-/// The best array for `shapes` within the limits and the `[search]` of a design.
+/// The best array for `shapes` within the limits and the `[search]` of a design. `announce` is given the processor time
+/// that the given design took at the accuracy of the search, s, before others are computed.
 ///
 /// # Errors
 /// A design that cannot be searched, with the reason; interruption before anything is known.
@@ -106,6 +110,7 @@ pub fn optimize_array(
     inputs: Vec<Input>,
     request: &ArrayRequest,
     physics: &ArrayPhysics<'_>,
+    announce: &dyn Fn(f64),
     progress: &dyn Progress,
 ) -> Result<ArrayOptimization, RunError> {
     let design = document.design;
@@ -129,6 +134,7 @@ pub fn optimize_array(
     progress.begin("given design", 2);
     let before = before(design, shapes, physics, progress)?;
     progress.end();
+    announce(before.search_cpu_s);
     let Problems {
         all,
         refused: impossible,
@@ -245,8 +251,11 @@ fn before(
     };
     // Full accuracy first: points are named by their number in the shape.
     let full = rendered(Level::Full)?;
+    let watch = Watch::start();
+    let search = rendered(Level::Search)?;
     Ok(Before {
-        search: rendered(Level::Search)?,
+        search,
+        search_cpu_s: watch.processor_s(),
         full,
     })
 }
