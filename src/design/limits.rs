@@ -44,7 +44,7 @@ macro_rules! limits {
 
 limits! {
     resistance_max_ohm: "resistance_max_ohm", si("ohm"), "resistance at the wire's temperature";
-    settling_max_s: "settling_max_ms", MS, "five time constants of the coil";
+    settling_max_s: "settling_max_ms", MS, "settling of the coil: five time constants, or what its loop takes with `supply.driver = \"current\"`";
     outer_diameter_max_m: "outer_diameter_max_mm", MM, "outer diameter of the winding";
     inner_diameter_min_m: "inner_diameter_min_mm", MM, "bore of the winding, at least; without it `optimize --wound` takes that of a bobbin";
     length_max_m: "length_max_mm", MM, "length of the winding";
@@ -57,7 +57,7 @@ limits! {
     static_power_max_w: "static_power_max_w", si("W"), "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes";
     feedback_power_max_w: "feedback_power_max_w", si("W"), "mean heat of all coils over that shape with position feedback, currents of least power; known only with shapes";
     array_mass_max_kg: "array_mass_max_kg", si("kg"), "mass of all coils, cores and the plate";
-    array_settling_max_s: "array_settling_max_ms", MS, "five time constants of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`";
+    array_settling_max_s: "array_settling_max_ms", MS, "the same of the slowest pattern of currents in the array; without it `optimize --for` takes `settling_max_ms`";
     array_cost_max: "array_cost_max", si(""), "cost of all coils, cores and the plate by `[cost]`";
 }
 

@@ -422,7 +422,11 @@ fn regression_a_folder_of_another_plan_was_ignored_after_a_whole_one() {
         place
             .run(&[&["sweep", "merge", "one.json"][..], &folders].concat())
             .ends(4)
-            .says(&["another plan"]);
+            // It was to be replaced with --force, which did nothing.
+            .says(&[
+                "another plan",
+                "merge the folder with the plan that it was run with",
+            ]);
     }
     place.run(&["sweep", "merge", "one.json", "one"]).ends(0);
 }

@@ -19,7 +19,7 @@ use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 use crate::coil::limits::unchecked;
-use crate::design::{Design, Need};
+use crate::design::{Design, Driver, Need};
 use crate::report::limits::label;
 use crate::scene::core_material::MOST_PERMEABLE;
 use crate::scene::cost::of_steel;
@@ -131,13 +131,14 @@ fn summary(design: &Design, result: &Evaluation) -> String {
             mm(coil.size.length_m)
         ),
     );
+    let held = by_voltage(design);
     let flux = circuit.flux_linkage_wb.map_or_else(String::new, |flux| {
         format!("; flux linkage {}", si(flux, "Wb"))
     });
     sheet.line(
         "circuit",
         &format!(
-            "{}, {}{flux}; time constant {}, settled after {}",
+            "{}, {}{flux}; time constant {}, settled after {}{held}",
             si(circuit.resistance_ohm, "ohm"),
             si(circuit.inductance_h, "H"),
             si(circuit.time_constant_s, "s"),
@@ -177,6 +178,14 @@ fn summary(design: &Design, result: &Evaluation) -> String {
     sheet.finish()
 }
 
+/// What tells five time constants from what a current loop takes, where there is one.
+fn by_voltage(design: &Design) -> &'static str {
+    match design.supply.driver {
+        Driver::Current => " at a constant voltage",
+        Driver::Voltage => "",
+    }
+}
+
 /// The coils beside each other; `inductance_h` is that of one alone.
 fn add_array(sheet: &mut Sheet, design: &Design, array: &ArraySummary, inductance_h: f64) {
     let matrix = &array.mutual_inductance_h;
@@ -185,11 +194,12 @@ fn add_array(sheet: &mut Sheet, design: &Design, array: &ArraySummary, inductanc
         row.iter().enumerate().filter_map(other)
     });
     let largest = others.fold(0.0, f64::max);
+    let held = by_voltage(design);
     sheet.line(
         "array",
         &format!(
             "{}; largest mutual inductance {} ({} of a coil's own)\n\
-             the slowest pattern of currents settles after {}",
+             the slowest pattern of currents settles after {}{held}",
             describe::array(design),
             si(largest, "H"),
             percent(largest / inductance_h),

@@ -193,9 +193,7 @@ pub fn merge(
     files: &MergeFiles,
     progress: &dyn Progress,
 ) -> Result<MergeReport, RunError> {
-    for folder in &request.folders {
-        PointStore::new(folder).check_plan(plan)?;
-    }
+    check_plans(plan, request)?;
     let name = |suffix: &str| {
         let stem = files.table.file_stem().unwrap_or_default();
         format!("{}{suffix}", stem.to_string_lossy())
@@ -459,15 +457,30 @@ fn found(
             StoredPoint::Point(point) => return Ok(Some(*point)),
             StoredPoint::Nothing => {}
             StoredPoint::Foreign(reason) => {
-                return Err(RunError::Sweep(format!(
-                    "{} exists {reason}; merge the folder with the plan that it was run with, or \
-                     run this plan into another folder",
-                    store.path(index).display()
-                )));
+                return Err(foreign(&store.path(index), &reason));
             }
         }
     }
     Ok(None)
+}
+
+/// Refuses folders of other plans.
+fn check_plans(plan: &PlanFile, request: &MergeRequest) -> Result<(), RunError> {
+    for folder in &request.folders {
+        match PointStore::new(folder).check_plan(plan) {
+            Err(WriteError::OutputExists { path, reason }) => return Err(foreign(&path, &reason)),
+            checked => checked?,
+        }
+    }
+    Ok(())
+}
+
+/// A file of another plan, and why it is one.
+fn foreign(path: &Path, reason: &str) -> RunError {
+    RunError::Sweep(format!(
+        "{} exists {reason}; merge the folder with the plan that it was run with, or run this plan into another folder",
+        path.display()
+    ))
 }
 
 /// The first ranges: `3, 17-25, ...`.

@@ -15,6 +15,9 @@ const PANEL_PX: [f64; 2] = [460.0, 400.0];
 /// Height of a panel's title, px.
 const TITLE_PX: u32 = 14;
 
+/// Characters of a name; longer ones take the squares' room.
+const NAME_MAX: usize = 20;
+
 /// Where there is no value.
 const NOTHING: &str = "#b5b5b5";
 /// Red, green and blue of the largest value.
@@ -79,14 +82,30 @@ impl MatrixPlot {
                 .with_color_map(colours())
                 .with_values(),
         )];
+        let names: Vec<String> = self.names.iter().map(|name| fitting(name)).collect();
         let layout = Layout::auto_from_plots(&plots)
             .with_title(panel.title.clone())
             .with_title_size(TITLE_PX)
-            .with_x_categories(self.names.clone())
+            .with_x_categories(names.clone())
             .with_x_tick_rotate(-30.0)
-            .with_y_categories(self.names.clone());
+            .with_y_categories(names);
         (plots, layout)
     }
+}
+
+/// A name as long as there is room for: its beginning and its end.
+fn fitting(name: &str) -> String {
+    let characters: Vec<char> = name.chars().collect();
+    if characters.len() <= NAME_MAX {
+        return name.to_owned();
+    }
+    let [begin, end] = [NAME_MAX / 2, (NAME_MAX - 1) / 2];
+    let parts = [
+        &characters[..begin],
+        &['\u{2026}'],
+        &characters[characters.len() - end..],
+    ];
+    parts.concat().into_iter().collect()
 }
 
 /// From white to orange, on which black numbers are read; grey where there is nothing.
@@ -114,7 +133,8 @@ mod tests {
     fn a_matrix_names_its_rows_and_shows_its_numbers() {
         let drawing = MatrixPlot {
             title: "apart".to_owned(),
-            names: vec!["dome".to_owned(), "wedge".to_owned()],
+            // A name of 83 characters left no room for any square.
+            names: vec!["dome".to_owned(), format!("wedge {} steep", "x".repeat(72))],
             columns: 2,
             panels: vec![Panel {
                 title: "largest".to_owned(),
@@ -122,7 +142,13 @@ mod tests {
             }],
         };
         let svg = drawing.drawing().svg();
-        for text in ["dome", "wedge", "1.73", "largest", "apart"] {
+        for text in [
+            "dome",
+            "wedge xxxx\u{2026}xxx steep",
+            "1.73",
+            "largest",
+            "apart",
+        ] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(svg == drawing.drawing().svg());
