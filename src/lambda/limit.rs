@@ -11,9 +11,9 @@
 //! four ways, are a rule of twice the spacing. The error falls with the second power of the spacing,
 //! those rules are off four times as far, so they differ from all points by three times the error of
 //! these, in the share of the area that is in blocks. The largest difference, with a margin, is the
-//! estimate. The least force over all places is no mean: for it every third point along both axes is taken, and all
-//! ends. Where the force has its least between points, at most half a spacing from the next one, one of these ways leaves
-//! the points up to one and a half away: off twice as far at a kink, four times and more where it is smooth.
+//! estimate. The least force over all places is no mean: with the currents that hold it at the
+//! points it may be smaller between them. Where it bends evenly it is taken for a parabola, elsewhere for any convex
+//! function.
 //!
 //! Points that count alike give another limit than the object's, off by the first power of the
 //! spacing: their border counts twice. The difference from the same points by area is in the first one.
@@ -25,6 +25,7 @@ use fluxform_numerics::random::seed_at;
 use super::Criterion;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::solve::constant;
+use super::worst::{Maxmin, maxmin};
 
 /// The difference from nothing, and from what cannot be known.
 const ALL: f64 = 1.0;
@@ -32,10 +33,11 @@ const ALL: f64 = 1.0;
 const SUBSETS: usize = 4;
 /// The rounding error of a weight, relative to the largest.
 const ROUNDING: f64 = 1e-9;
-/// Of every so many points along an axis one is taken for the least force over all places.
-const THINNED: usize = 3;
-/// The least over these differs from that over all points by at least so many times the error of those.
-const THINNED_TO_ERROR: f64 = 2.0;
+/// Bends of a force over the height are those of a smooth one where the next ones outwards are at least this share.
+const ALIKE: f64 = 0.4;
+/// What a parabola may leave of such a bend: an eighth of the deepest dip that has it; at an end half of that.
+const BETWEEN: f64 = 1.0 / 64.0;
+const AT_AN_END: f64 = 1.0 / 16.0;
 /// A rule of twice the spacing differs from the points by so many times their error.
 const SPACING_TO_ERROR: f64 = 3.0;
 /// Of the largest difference: of 4500 random objects on grids of 13 to 37 points a side 7 are further off
@@ -135,14 +137,12 @@ pub fn limit_error(
     };
     let of_cells = apart(by_points).unwrap_or(ALL);
     let of_spacing = match settings.criterion {
-        // The least over places: the one that decides may be a sample, or a corner of every block.
         Criterion::Maxmin => {
-            let ways: Vec<usize> = (0..THINNED * THINNED).collect();
-            let thinned = largest(&ways, |&which| {
-                let samples = fine.map(|fine| thinned(fine.areas, which % THINNED));
-                differs(&places.thinned(areas, which), samples.as_deref())
-            })?;
-            thinned / THINNED_TO_ERROR
+            let rows = Rows::of(problem, areas, fine.map(|fine| (fine, fine.areas)));
+            match maxmin(&rows.problem(problem))? {
+                Some(found) => places.below(problem, areas, &found),
+                None => ALL,
+            }
         }
         _ => spacing_off(places, areas, (of_cells, fine), differs)?,
     };
@@ -219,13 +219,49 @@ fn largest<T: Sync>(
     Ok(most.unwrap_or(ALL))
 }
 
-/// The weights of the `which`-th of every few points.
-fn thinned(areas: &[f64], which: usize) -> Vec<f64> {
-    let weight = |(point, area): (usize, &f64)| match point % THINNED == which {
-        true => *area,
-        false => 0.0,
+/// By how much a function may be below the smaller of its values at two places, `inner`, where `left` and `right` are
+/// the next ones outwards, as far as there are any. Where it bends further out as between them, or ends on one side, as
+/// low as a parabola and a share of its bend; else, at a kink, above the lines through the next two places on either
+/// side; of two places alone as much as they differ by.
+fn dip(left: [Option<f64>; 2], right: [Option<f64>; 2], [from, to]: [f64; 2]) -> f64 {
+    let least = from.min(to);
+    let bend = |[a, b, c]: [f64; 3]| a - 2.0 * b + c;
+    let (Some(before), Some(after)) = (left[0], right[0]) else {
+        let three = match (left[0], right[0]) {
+            (None, Some(after)) => [from, to, after],
+            (Some(before), None) => [to, from, before],
+            _ => return (to - from).abs(),
+        };
+        return least - least_of_parabola(three) + AT_AN_END * bend(three).abs();
     };
-    areas.iter().enumerate().map(weight).collect()
+    let most = bend([before, from, to]).max(bend([from, to, after]));
+    let outwards = [
+        left[1].map(|far| bend([far, before, from])),
+        right[1].map(|far| bend([to, after, far])),
+    ];
+    let mut outwards = outwards.into_iter().flatten().peekable();
+    if outwards.peek().is_some() && outwards.all(|bend| bend >= ALIKE * most) {
+        let below = least_of_parabola([from, to, after]).min(least_of_parabola([to, from, before]));
+        return least - below + BETWEEN * most.abs();
+    }
+    let (a, b) = ([from, 2.0 * from - before], [2.0 * to - after, to]);
+    let [first, last] = [a[0] - b[0], a[1] - b[1]];
+    let ends = a[0].max(b[0]).min(a[1].max(b[1]));
+    let below = match first * last < 0.0 {
+        true => ends.min(a[0] + (a[1] - a[0]) * first / (first - last)),
+        false => ends,
+    };
+    (least - below).max(0.0)
+}
+
+/// The least between the first two of three places of one spacing.
+fn least_of_parabola([end, next, beyond]: [f64; 3]) -> f64 {
+    let curved = 0.5 * (end - 2.0 * next + beyond);
+    let slope = next - end - curved;
+    match curved > 0.0 && slope < 0.0 && -slope < 2.0 * curved {
+        true => end - 0.25 * slope * slope / curved,
+        false => end.min(next),
+    }
 }
 
 impl FineSamples<'_> {
@@ -241,39 +277,80 @@ impl FineSamples<'_> {
 }
 
 impl GridPlaces<'_> {
-    /// Which of every so `many` points along x and y a point is; `None` along an axis of one point. Counted from the
-    /// nearer end, so that none has the mirror image of what it leaves out.
-    pub(crate) fn of_every(&self, many: usize, place: usize) -> [Option<usize>; 2] {
+    /// Whether the place of a point is even or odd along x and y; `None` along an axis of one point. Counted from the
+    /// nearer end, so that no parity has the mirror image of what it leaves out.
+    pub(crate) fn parity(&self, place: usize) -> [Option<usize>; 2] {
         let [x, y] = [place % self.columns, place / self.columns];
         [(x, self.columns), (y, self.rows)]
-            .map(|(at, samples)| (samples > 1).then(|| at.min(samples - 1 - at) % many))
+            .map(|(at, samples)| (samples > 1).then(|| at.min(samples - 1 - at) % 2))
     }
 
-    /// The weights of one of every few points along both axes, in the `which`-th way; the ends along an axis are always
-    /// taken: the same object.
-    fn thinned(&self, areas: &[f64], which: usize) -> Vec<f64> {
-        let first = [which % THINNED, which / THINNED];
-        let weight = |(&place, &area): (&usize, &f64)| {
-            let own = self.of_every(THINNED, place);
-            let taken = |axis: usize| {
-                own[axis].is_none_or(|of| of == first[axis]) || self.is_end(place, axis)
-            };
-            match taken(0) && taken(1) {
-                true => area,
-                false => 0.0,
+    /// By how much the force over the height, with the currents of `found`, may be smaller between the points that
+    /// count than the constant that these hold, relative; all of it where an axis has two points.
+    fn below(&self, problem: &ForceProblem, areas: &[f64], found: &Maxmin) -> f64 {
+        if self.columns == 2 || self.rows == 2 {
+            return ALL;
+        }
+        let mut over_height = vec![f64::NAN; self.columns * self.rows];
+        let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
+        for (row, (forces, &place)) in rows.zip(self.index).enumerate() {
+            let forces = forces.iter().zip(&found.currents_a);
+            let force_n: f64 = forces.map(|(force, current)| force * current).sum();
+            let offset_n = problem.offset_n.map_or(0.0, |offset_n| offset_n[row]);
+            if problem.height_m[row] > 0.0 {
+                over_height[place] = (force_n + offset_n) / problem.height_m[row];
             }
+        }
+        // The points of a line from a place, one after the other, as far as the surface is smooth.
+        let along = |place: usize, axis: usize, onwards: bool| -> Option<usize> {
+            let next = self.beside(place, axis, onwards)?;
+            (!over_height[next].is_nan()).then_some(next)
         };
-        self.index.iter().zip(areas).map(weight).collect()
+        let dip_at = |place: usize, axis: usize, onwards: bool| -> f64 {
+            let Some(next) = along(place, axis, onwards) else {
+                return 0.0;
+            };
+            let outer = |from: usize, onwards: bool| {
+                let near = along(from, axis, onwards);
+                let far = near.and_then(|near| along(near, axis, onwards));
+                [near, far].map(|place| place.map(|place| over_height[place]))
+            };
+            let inner = [place, next].map(|place| over_height[place]);
+            dip(outer(place, !onwards), outer(next, onwards), inner)
+        };
+        let counting = self.index.iter().zip(areas);
+        let counting = counting.filter(|(place, area)| **area > 0.0 && over_height[**place] > 0.0);
+        let lowest = counting.map(|(&place, _)| {
+            let dips = [0, 1].map(|axis| dip_at(place, axis, true).max(dip_at(place, axis, false)));
+            over_height[place] - dips[0] - dips[1]
+        });
+        let lowest = lowest.fold(f64::INFINITY, f64::min);
+        let constant = found.lambda_n_per_m;
+        ((constant - lowest) / constant).clamp(0.0, ALL)
     }
 
-    /// Whether a point has no neighbour on one of its sides along x (0) or y (1).
-    fn is_end(&self, place: usize, axis: usize) -> bool {
-        let (at, samples, step) = match axis {
-            0 => (place % self.columns, self.columns, 1),
-            _ => (place / self.columns, self.rows, self.columns),
-        };
-        let is_point = |place: usize| self.index.binary_search(&place).is_ok();
-        at == 0 || at + 1 == samples || !is_point(place - step) || !is_point(place + step)
+    /// The place next to one along x (0) or y (1), where the cells on both sides of the way there are smooth.
+    fn beside(&self, place: usize, axis: usize, onwards: bool) -> Option<usize> {
+        let at = [place % self.columns, place / self.columns];
+        let samples = [self.columns, self.rows];
+        let mut from = at;
+        if onwards {
+            (at[axis] + 1 < samples[axis]).then_some(())?;
+        } else {
+            from[axis] = from[axis].checked_sub(1)?;
+        }
+        let across = 1 - axis;
+        // With one row or column there are no cells.
+        let sides = [from[across].checked_sub(1), Some(from[across])];
+        let mut sides = sides.into_iter().flatten();
+        let smooth = samples[across] == 1
+            || sides.all(|side| {
+                let mut cell = from;
+                cell[across] = side;
+                side + 1 >= samples[across] || self.is_smooth(cell[0], cell[1])
+            });
+        let step = [1, self.columns][axis];
+        smooth.then_some(if onwards { place + step } else { place - step })
     }
 
     /// The weights of the points where every block of two by two smooth cells counts by its corners alone, blocks
@@ -428,24 +505,58 @@ impl Rows {
         all
     }
 
-    fn constant(&self, problem: &ForceProblem, settings: &Settings) -> Result<Found, ProblemError> {
-        if self.height_m.is_empty() {
-            return Ok(Found::Nothing);
-        }
-        let rows = ForceProblem {
+    /// The problem of these rows instead of those of `problem`.
+    fn problem<'a>(&'a self, problem: &ForceProblem<'a>) -> ForceProblem<'a> {
+        ForceProblem {
             forces_n_per_a: &self.forces_n_per_a,
             height_m: &self.height_m,
             offset_n: self.offset_n.as_deref(),
             weights: Some(&self.weights),
             ..*problem
-        };
-        Found::of(&rows, settings)
+        }
+    }
+
+    fn constant(&self, problem: &ForceProblem, settings: &Settings) -> Result<Found, ProblemError> {
+        match self.height_m.is_empty() {
+            true => Ok(Found::Nothing),
+            false => Found::of(&self.problem(problem), settings),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of samples of known functions the dip between two places covers that of the function.
+    #[test]
+    fn a_dip_between_places_is_that_of_the_function() {
+        let between = |f: &dyn Fn(f64) -> f64, inside: bool| {
+            let [left, right] = [[-1.0, -2.0], [2.0, 3.0]].map(|at| at.map(|x| Some(f(x))));
+            let left = if inside { left } else { [None; 2] };
+            let found = dip(left, right, [f(0.0), f(1.0)]);
+            let least = (0..=1000).map(|k| f(f64::from(k) * 1e-3));
+            let least = least.fold(f64::INFINITY, f64::min);
+            (found, f(0.0).min(f(1.0)) - least)
+        };
+        for at in [0.0, 0.1, 0.3, 0.5, 0.8, 1.0] {
+            for inside in [true, false] {
+                let (found, dips) = between(&|x| (x - at).powi(2), inside);
+                assert!(
+                    found >= dips - 1e-6 && found < dips + 0.2,
+                    "{at} {found} {dips}"
+                );
+            }
+            let (found, dips) = between(&|x| (x - at).abs(), true);
+            assert!(
+                found >= dips - 1e-9 && found < dips + 0.1,
+                "{at} {found} {dips}"
+            );
+        }
+        // It falls evenly, to an end.
+        assert_eq!(between(&|x| x, false), (0.0, 0.0));
+        assert_eq!(dip([None; 2], [None; 2], [1.0, 3.0]), 2.0);
+    }
 
     /// A rule whose path ends early was off by all of the force constant.
     #[test]

@@ -80,7 +80,7 @@ pub fn quarters(rows: &[usize], grid: Option<GridPlaces>) -> Vec<usize> {
         let place = grid.and_then(|grid| Some((grid, *grid.index.get(*row)?)));
         match place {
             Some((grid, place)) => {
-                let [x, y] = grid.of_every(2, place).map(|of| of.unwrap_or(0));
+                let [x, y] = grid.parity(place).map(|of| of.unwrap_or(0));
                 x + 2 * y
             }
             None => number % QUARTERS,
