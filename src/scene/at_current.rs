@@ -7,9 +7,6 @@ use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::linear_equivalent::{GradientDifferences, LinearEquivalent};
 use crate::field::steel::saturated_coil::{CoilWithCurve, SaturatedCoil, SaturatedCoilError};
 
-/// Tolerance of the core at smaller currents, whose difference is a bound.
-const SMALLER_TOLERANCE: f64 = 1e-3;
-
 /// The coil of `scene` at `current_a` along `curve`, to `tolerance` from `height_m` up, or as far
 /// as the refinements carry.
 ///
@@ -27,13 +24,17 @@ pub(crate) fn solve(
 ) -> Result<SaturatedCoil, RunError> {
     coil(scene, core, curve)
         .solve(current_a, tolerance, height_m)
-        .map_err(|error| match error {
-            SaturatedCoilError::OnEdge(on_edge) => on_edge.into(),
-            SaturatedCoilError::Mesh(fault) => {
-                RunError::Input(format!("[core] with a B-H curve: {fault}"))
-            }
-            SaturatedCoilError::Stalled => no_state(current_a),
-        })
+        .map_err(|error| refused(error, current_a))
+}
+
+fn refused(error: SaturatedCoilError, current_a: f64) -> RunError {
+    match error {
+        SaturatedCoilError::OnEdge(on_edge) => on_edge.into(),
+        SaturatedCoilError::Mesh(fault) => {
+            RunError::Input(format!("[core] with a B-H curve: {fault}"))
+        }
+        SaturatedCoilError::Stalled => no_state(current_a),
+    }
 }
 
 /// The linear core that is taken for the one at `state` where cores are coupled: alone it has the same gradient on
@@ -52,33 +53,19 @@ pub(crate) fn linear(
     Ok(coil(scene, core, curve).linear_equivalent(state, first, height_m)?)
 }
 
-/// Share of the knee's flux density that smaller currents are aimed at.
-const BELOW_KNEE: f64 = 0.5;
-/// Solutions until a core is below its knee, at most; one or two are usual.
-const MOST_SMALLER: usize = 8;
-
-/// How much more than `state`, which is above the steel's knee at `current_a`, the core gives per ampere at currents that
-/// leave it below.
+/// How far the core's gradients per ampere at smaller currents are from those at `current_a`.
 ///
 /// # Errors
 /// As [`solve`].
-pub(crate) fn below_knee(
+pub(crate) fn smaller_currents(
     scene: &Scene,
     core: &SceneCore,
     curve: &BhCurve,
-    (state, current_a): (&SaturatedCoil, f64),
-    height_m: f64,
+    current_a: f64,
 ) -> Result<GradientDifferences, RunError> {
-    let (mut below, mut smaller_a) = (state.clone(), current_a);
-    for _ in 0..MOST_SMALLER {
-        // |B| grows less than the current: this is above what it is aimed at, at times above the knee.
-        smaller_a *= BELOW_KNEE * core.knee_t / below.inside.peak_b_t;
-        below = solve(scene, core, curve, smaller_a, SMALLER_TOLERANCE, height_m)?;
-        if below.inside.peak_b_t <= core.knee_t {
-            break;
-        }
-    }
-    Ok(coil(scene, core, curve).gradient_differences(state, &below.layer)?)
+    coil(scene, core, curve)
+        .smaller_currents(current_a)
+        .map_err(|error| refused(error, current_a))
 }
 
 /// The curve's permeability at the mean |B| of `state`.

@@ -34,12 +34,12 @@ const STEEL_SHARE: f64 = 0.45;
 
 /// The stage that states what linear cores leave of their B-H curve.
 pub(crate) const LINEAR_CORES: &str = "linear_cores";
-/// The one that states what a core above its knee gives more per ampere at smaller currents.
+/// The one that states how far forces per ampere along a B-H curve are from those at smaller currents.
 pub(crate) const SMALLER_CURRENTS: &str = "smaller_currents";
 
 /// How it is known what smaller currents give.
-const AT_SMALLER_CURRENTS: &str = "the largest difference of a core at a current that leaves it below the steel's knee \
-                                   from itself at the largest current of a coil, alone and per ampere";
+const AT_SMALLER_CURRENTS: &str = "the largest difference of a core at several smaller currents from itself at the \
+                                   largest current of a coil, alone and per ampere, with a margin";
 
 /// How the error of linear cores in the place of those along a curve is known.
 const TWO_OF_LINEAR_CORES: &str = "the difference of two resolutions of the coupled cores, which are linear: what that \
@@ -74,15 +74,6 @@ impl Steel {
     }
 }
 
-/// A core above its steel's knee at the largest current.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct AboveKnee {
-    /// The largest |B|, T.
-    peak_t: f64,
-    /// What it gives more per ampere at currents that leave it below the knee.
-    smaller_currents: GradientDifferences,
-}
-
 /// A scene's field sources, ready to be evaluated.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
@@ -100,9 +91,12 @@ pub struct Solved {
     linear: Option<LinearEquivalent>,
     /// The height that it was solved from, m.
     lowest_m: f64,
-    /// What a core does that is above the steel's knee at that current.
+    /// The largest |B| in a core at that current, T, where it is above the steel's knee.
     #[serde(default)]
-    above_knee: Option<AboveKnee>,
+    above_knee_t: Option<f64>,
+    /// How far a core's gradients are from those at smaller currents.
+    #[serde(default)]
+    smaller_currents: Option<GradientDifferences>,
     /// The field as it was last prepared.
     #[serde(skip)]
     prepared: PreparedField,
@@ -119,7 +113,8 @@ impl Solved {
             relative_permeability: 1.0,
             linear: None,
             lowest_m: f64::NEG_INFINITY,
-            above_knee: None,
+            above_knee_t: None,
+            smaller_currents: None,
             prepared: PreparedField::default(),
         }
     }
@@ -127,7 +122,8 @@ impl Solved {
     /// A sentence on forces per ampere that hold at the currents of saturated cores alone.
     #[must_use]
     pub fn above_knee(&self, scene: &Scene) -> Option<String> {
-        let (above, core) = self.above_knee.as_ref().zip(scene.core.as_ref())?;
+        let (peak_t, core) = self.above_knee_t.zip(scene.core.as_ref())?;
+        let smaller = self.smaller_currents.as_ref()?.largest_from(self.lowest_m);
         let linear = self.linear_cores().map_or_else(String::new, |stage| {
             format!(
                 "; coupled cores are taken as linear: one alone is up to {:.2} % off the B-H curve, among neighbours it \
@@ -136,13 +132,12 @@ impl Solved {
             )
         });
         Some(format!(
-            "the core at {} A reaches {:.2} T, above the steel's knee at {:.2} T: forces per ampere are those at \
-             that current; smaller currents give up to {:.0} % more, and forces of several do not add up: set \
+            "the core at {} A reaches {peak_t:.2} T, above the steel's knee at {:.2} T: forces per ampere are those at \
+             that current; those of smaller currents are up to {:.2} % off, and forces of several do not add up: set \
              supply.current_max_a near the currents used{linear}",
             most_current_a(scene),
-            above.peak_t,
             core.knee_t,
-            100.0 * above.smaller_currents.largest_from(self.lowest_m)
+            100.0 * smaller
         ))
     }
 
@@ -153,15 +148,14 @@ impl Solved {
     }
 
     /// What the forces per ampere leave of a B-H curve, by the stages' names: those of linear cores, and those of smaller
-    /// currents where the core is above its knee.
+    /// currents.
     ///
     /// It is what the model leaves, which no tolerance changes: stages of their own.
     pub fn curve_stages(&self) -> impl Iterator<Item = (&'static str, StageAccuracy)> {
         let linear = self.linear_cores().map(|stage| (LINEAR_CORES, stage));
-        let smaller = self.above_knee.as_ref().map(|above| {
-            let stage = self.of_curve(&above.smaller_currents, AT_SMALLER_CURRENTS);
-            (SMALLER_CURRENTS, stage)
-        });
+        let smaller = self.smaller_currents.as_ref();
+        let smaller = smaller.map(|differs| self.of_curve(differs, AT_SMALLER_CURRENTS));
+        let smaller = smaller.map(|stage| (SMALLER_CURRENTS, stage));
         linear.into_iter().chain(smaller)
     }
 
@@ -461,7 +455,9 @@ pub(super) fn solve_with(
     let along_curve = along_curve(scene, core, tolerance, lowest_m)?;
     let relative_permeability = permeability(core, along_curve.as_ref());
     let of_curve = along_curve.as_ref();
-    let above_knee = of_curve.and_then(|of| of.above_knee.clone());
+    let peak_t = of_curve.map(|of| of.state.inside.peak_b_t);
+    let above_knee_t = peak_t.filter(|peak_t| *peak_t > core.knee_t);
+    let smaller_currents = of_curve.map(|of| of.smaller_currents.clone());
     let linear = of_curve.and_then(|of| of.linear.clone());
     let solved = |steel, steel_error| Solved {
         steel,
@@ -470,7 +466,8 @@ pub(super) fn solve_with(
         relative_permeability,
         linear,
         lowest_m,
-        above_knee,
+        above_knee_t,
+        smaller_currents: smaller_currents.clone(),
         prepared: PreparedField::default(),
     };
     if coupled(scene.design) {
@@ -528,7 +525,7 @@ struct AlongCurve {
     state: SaturatedCoil,
     /// What is taken for it where cores are coupled.
     linear: Option<LinearEquivalent>,
-    above_knee: Option<AboveKnee>,
+    smaller_currents: GradientDifferences,
     relative_permeability: f64,
 }
 
@@ -552,18 +549,8 @@ fn along_curve(
     let linear = coupled(scene.design)
         .then(|| at_current::linear(scene, core, curve, &state))
         .transpose()?;
-    let peak_t = state.inside.peak_b_t;
-    let above_knee = if peak_t > core.knee_t {
-        let at_most = (&state, current_a);
-        Some(AboveKnee {
-            peak_t,
-            smaller_currents: at_current::below_knee(scene, core, curve, at_most, lowest_m)?,
-        })
-    } else {
-        None
-    };
     Ok(Some(AlongCurve {
-        above_knee,
+        smaller_currents: at_current::smaller_currents(scene, core, curve, current_a)?,
         relative_permeability: linear.as_ref().map_or_else(
             || at_current::mean_permeability(curve, &state),
             |linear| linear.relative_permeability,
@@ -644,7 +631,8 @@ fn solve_iron(
         relative_permeability: core.map_or(1.0, SceneCore::relative_permeability),
         linear: None,
         lowest_m,
-        above_knee: None,
+        above_knee_t: None,
+        smaller_currents: None,
         prepared: PreparedField::default(),
     })
 }

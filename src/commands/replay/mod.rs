@@ -38,6 +38,8 @@ use synthesize::Synthesis;
 
 /// Of a lone coil in the drawing of a bundle that holds no design.
 const UNKNOWN_RADIUS_M: f64 = 0.01;
+/// What forces per ampere differ by, of smaller currents, from which on that is said.
+const WARNED: f64 = 0.01;
 /// Positions between two looks at the interruption flag.
 const PORTION: usize = 4096;
 
@@ -171,15 +173,17 @@ impl Opened {
         Some(Felt::new(study.given, ohm, positions))
     }
 
-    /// A sentence where smaller currents give more force per ampere than the bundle's.
+    /// A sentence where smaller currents give another force per ampere than the bundle's.
     fn of_smaller_currents(&self) -> Option<String> {
         let stage = self.bundle.manifest.accuracy.get(SMALLER_CURRENTS)?;
-        Some(format!(
-            "the forces per ampere are those of cores above their steel's knee, at the largest currents: smaller ones give \
-             up to {:.0} % more, which the stated error of the forces allows for; set supply.current_max_a near the \
-             currents used and calibrate again",
-            100.0 * stage.estimate
-        ))
+        (stage.estimate >= WARNED).then(|| {
+            format!(
+                "the forces per ampere are those of cores at the largest currents: of smaller ones they are up to {:.2} % \
+                 off, which the stated error of the forces allows for; set supply.current_max_a near the currents used \
+                 and calibrate again",
+                100.0 * stage.estimate
+            )
+        })
     }
 
     /// The circuit of the bundle's coils, without current.

@@ -277,7 +277,7 @@ impl Followed {
 pub(super) struct Bounds {
     /// Of the force per ampere, relative to the largest at the height.
     relative: f64,
-    /// What smaller currents give more of it.
+    /// What it differs by at smaller currents.
     smaller_currents: f64,
     /// The currents that the forces per ampere hold at, at most, A.
     most_a: f64,
@@ -310,7 +310,7 @@ impl Bounds {
     pub(super) fn add(&mut self, certificate: f64, largest_n_per_a: f64, currents_a: &[f64]) {
         let sizes_a = currents_a.iter().map(|current| current.abs());
         let off_a = sizes_a.map(|size_a| {
-            // Along the curve a smaller current gives no more force than a larger one.
+            // Along the curve a smaller current gives no more force than a larger one, and nearly that one's close to it.
             let left_a = (self.most_a - size_a).max(0.0);
             self.relative * size_a + (self.smaller_currents * size_a).min(left_a)
         });

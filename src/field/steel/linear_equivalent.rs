@@ -13,7 +13,7 @@ use super::cored_coil::{Excitation, densities};
 use super::double_layer::operators;
 use super::generatrix::{Generatrix, Resolution};
 use super::magnetized::MagnetizedCore;
-use super::saturated_coil::{CoilWithCurve, SaturatedCoil};
+use super::saturated_coil::{CoilWithCurve, SaturatedCoil, SaturatedCoilError};
 use crate::winding::OnEdge;
 
 /// Difference at the height, in stated errors of the core along its curve, that ends the search.
@@ -29,6 +29,13 @@ const LARGEST: f64 = 1e9;
 const HEIGHTS: i32 = 9;
 /// Distances from the axis there, in radii.
 const ACROSS: [f64; 7] = [0.0, 0.4, 0.8, 1.0, 1.3, 1.7, 3.0];
+
+/// Smaller currents that are looked at, over the largest: from saturation down to where permeability is that of no field.
+const SMALLER: [f64; 5] = [0.7, 0.4, 0.15, 0.03, 0.002];
+/// Tolerance of their resolution.
+const SMALLER_TOLERANCE: f64 = 1e-3;
+/// What currents between them may differ by more.
+const SMALLER_MARGIN: f64 = 1.15;
 
 /// How its errors are known.
 pub const AGAINST_THE_CURVE: &str = "the largest difference of one linear core from one along the B-H curve at the \
@@ -54,6 +61,21 @@ pub struct GradientDifferences(
 );
 
 impl GradientDifferences {
+    fn with(self, change: impl Fn(f64) -> f64) -> Self {
+        let changed = self.0.into_iter();
+        Self(
+            changed
+                .map(|[z_m, differs]| [z_m, change(differs)])
+                .collect(),
+        )
+    }
+
+    /// The larger one at every height; both are at the same heights.
+    fn or_more(self, other: &Self) -> Self {
+        let pairs = self.0.into_iter().zip(&other.0);
+        Self(pairs.map(|([z_m, a], [_, b])| [z_m, a.max(*b)]).collect())
+    }
+
     /// The largest from `lowest_m` up, relative to the largest |grad B| at a height; closer to the core than a tenth of
     /// its radius none is known.
     #[must_use]
@@ -130,24 +152,43 @@ impl CoilWithCurve<'_> {
             relative_permeability: permeability(x),
             flux_error: self.flux_difference(state.added_inductance_h, added_h)
                 + state.relative_error,
-            gradient: self.gradient_differences(state, &layer)?,
+            gradient: self
+                .gradient_differences(along, &layer)?
+                .with(|differs| differs + state.relative_error),
         })
     }
 
-    /// How far the gradients per ampere of the core `layer` are from those of `state`, whose own error is added.
+    /// How far the gradients per ampere at smaller currents are from those at `current_a`, with a margin for the currents
+    /// between those looked at.
     ///
     /// # Errors
-    /// A place on the winding's edge.
-    pub fn gradient_differences(
+    /// As [`CoilWithCurve::solve`].
+    pub fn smaller_currents(
         &self,
-        state: &SaturatedCoil,
-        layer: &MagnetizedCore,
+        current_a: f64,
+    ) -> Result<GradientDifferences, SaturatedCoilError> {
+        // Of one resolution, whose errors are alike at all currents.
+        let resolution = Resolution::for_tolerance(SMALLER_TOLERANCE);
+        let at = |share: f64| self.at_resolution(share * current_a, &resolution);
+        let largest = at(1.0)?.layer;
+        let mut all = self.gradient_differences(&largest, &largest)?;
+        for share in SMALLER {
+            all = all.or_more(&self.gradient_differences(&largest, &at(share)?.layer)?);
+        }
+        Ok(all.with(|differs| SMALLER_MARGIN * differs))
+    }
+
+    /// How far the gradients per ampere of the core `other` are from those of `one`.
+    fn gradient_differences(
+        &self,
+        one: &MagnetizedCore,
+        other: &MagnetizedCore,
     ) -> Result<GradientDifferences, OnEdge> {
         let at = (0..HEIGHTS).map(|step| {
             let above_m = (self.closest_m() - self.shape.top_m) * f64::from(step).exp2();
             let z_m = self.shape.top_m + above_m;
-            let differs = self.gradient_difference(&state.layer, layer, z_m, &ACROSS)?;
-            Ok([z_m, differs + state.relative_error])
+            let differs = self.gradient_difference(one, other, z_m, &ACROSS)?;
+            Ok([z_m, differs])
         });
         Ok(GradientDifferences(at.collect::<Result<_, OnEdge>>()?))
     }
