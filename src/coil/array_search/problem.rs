@@ -115,8 +115,8 @@ pub struct Bounded {
     slack: f64,
     /// By how much a search must stay below the limit, or above it.
     margin: f64,
-    /// Excess that a search takes for none: every design has it.
-    unavoidable: f64,
+    /// Whether a search gave it up, since no design meets it.
+    given_up: bool,
 }
 
 impl Bounded {
@@ -131,7 +131,7 @@ impl Bounded {
             scale: None,
             slack: 0.0,
             margin: MARGIN,
-            unavoidable: 0.0,
+            given_up: false,
         }
     }
 
@@ -161,6 +161,11 @@ impl Bounded {
         }
     }
 
+    /// Whether it is the same limit, on the same side.
+    fn is_same_limit(&self, other: &Self) -> bool {
+        self.key == other.key && self.at_least == other.at_least
+    }
+
     /// By how much the limit is broken: above 0 where it is.
     #[must_use]
     pub fn excess(&self) -> f64 {
@@ -179,7 +184,7 @@ impl Bounded {
 
     /// What a search takes for the excess: above [`MET`] where the limit is broken, or may be once lengths are rounded.
     fn judged(&self) -> f64 {
-        let excess = self.excess() + self.margin - self.unavoidable;
+        let excess = self.excess() + self.margin;
         match self.ends_range() {
             true => excess.max(FIRM * excess),
             false => excess,
@@ -209,6 +214,8 @@ const EXACT: f64 = MET - ROUNDING;
 const LARGEST_CORRECTION: f64 = 0.5;
 /// Least difference of core and bore diameter that leaves a core, and least length of one, mm.
 const LEAST_CORE_MM: f64 = 1.0;
+/// Weight of the excess over limits that were given up: above what force they buy, below the cost of those that are kept.
+const GIVEN_UP: f64 = 4.0;
 /// Weight of the excess over the end of a range beside that over a limit: where no design meets every limit, the one
 /// that breaks them least is to be within the ranges.
 const FIRM: f64 = 1e3;
@@ -237,8 +244,8 @@ pub struct ArrayProblem<'a> {
     room: Room,
     /// Limits that are no part of the search, by key: those that all designs of all choices meet or break alike.
     left_out: Vec<&'static str>,
-    /// Those that no sample of a search met, and the least that one broke them by.
-    unavoidable: RwLock<Vec<(&'static str, f64)>>,
+    /// Those that no sample of a search met.
+    given_up: RwLock<Vec<Bounded>>,
     /// The correction of the search's outputs to full accuracy.
     correction: RwLock<Vec<f64>>,
     /// Samples that were computed to full accuracy, by their variables; `None` where there is no such design.
@@ -262,7 +269,7 @@ impl<'a> ArrayProblem<'a> {
             reference_ln: reference.iter().map(|merit| merit.ln()).collect(),
             room,
             left_out: Vec::new(),
-            unavoidable: RwLock::default(),
+            given_up: RwLock::default(),
             correction: RwLock::default(),
             known: RwLock::default(),
         }
@@ -273,10 +280,10 @@ impl<'a> ArrayProblem<'a> {
         self.left_out.push(key);
     }
 
-    /// Where limits are met by no sample of `search`, the least that one breaks each by counts for nothing from now on: so
-    /// that others count which can be met. Whether there are such limits.
+    /// Where limits are met by no sample of `search`, they are no limits from now on: of the designs that meet the others
+    /// the one that breaks them least is the best. Whether there are such limits.
     pub(super) fn give_up_unmet(&self, search: &Search<'_>) -> bool {
-        let mut least: Option<Vec<Bounded>> = None;
+        let mut unmet: Option<Vec<Bounded>> = None;
         for sample in search.samples() {
             let Some(physical) = self.properties(sample) else {
                 continue;
@@ -285,24 +292,18 @@ impl<'a> ArrayProblem<'a> {
             if !in_ranges(&bounds) {
                 continue;
             }
-            let known = least.get_or_insert_with(|| bounds.clone());
-            known.retain_mut(|known| {
-                let of_key =
-                    |bound: &&Bounded| bound.key == known.key && bound.at_least == known.at_least;
-                let bound = bounds.iter().find(of_key);
-                if let Some(bound) = bound.filter(|bound| bound.excess() < known.excess()) {
-                    *known = *bound;
-                }
-                known.excess() > MET && !known.ends_range()
-            });
+            let broken = |known: &Bounded| {
+                let bound = bounds.iter().find(|bound| bound.is_same_limit(known));
+                bound.is_some_and(|bound| bound.excess() > MET)
+            };
+            unmet
+                .get_or_insert_with(|| bounds.clone())
+                .retain(|known| !known.ends_range() && broken(known));
         }
-        let unmet = least.into_iter().flatten();
-        // What is left shows that they are broken.
-        let unmet = unmet.map(|bound| (bound.key, bound.excess() - 2.0 * MET));
-        let unmet: Vec<_> = unmet.filter(|(_, excess)| *excess > 0.0).collect();
+        let unmet = unmet.unwrap_or_default();
         let found = !unmet.is_empty();
         *self
-            .unavoidable
+            .given_up
             .write()
             .unwrap_or_else(PoisonError::into_inner) = unmet;
         found
@@ -419,7 +420,7 @@ impl<'a> ArrayProblem<'a> {
             let physical = self.properties(sample)?;
             let bounds = self.bounds(&sample.x, Some(&physical));
             let judged = self.judged(Some(&physical), &bounds);
-            let rank = (judged.excess() <= MET, in_ranges(&bounds), judged.merit());
+            let rank = (keeps_others(&bounds), in_ranges(&bounds), judged.merit());
             rank.2.is_finite().then_some((rank, sample, judged))
         });
         let best = ranked.reduce(|a, b| if b.0 > a.0 { b } else { a });
@@ -489,12 +490,11 @@ impl<'a> ArrayProblem<'a> {
         add_plate(&design, &mut all);
         self.add_height(x, &mut all);
         all.retain(|bound| !self.left_out.contains(&bound.key));
-        let unavoidable = self.unavoidable.read();
-        let unavoidable = unavoidable.unwrap_or_else(PoisonError::into_inner);
+        let given_up = self.given_up.read();
+        let given_up = given_up.unwrap_or_else(PoisonError::into_inner);
         for bound in &mut all {
             bound.margin = self.margin(x, bound);
-            let of_key = unavoidable.iter().find(|(key, _)| *key == bound.key);
-            bound.unavoidable = of_key.map_or(0.0, |(_, excess)| *excess);
+            bound.given_up = given_up.iter().any(|known| known.is_same_limit(bound));
         }
         all
     }
@@ -634,9 +634,15 @@ impl<'a> ArrayProblem<'a> {
     /// Objective and limits from bounds that are known.
     #[must_use]
     pub fn judged(&self, physical: Option<&Physical>, bounds: &[Bounded]) -> Judged {
+        let (given_up, kept): (Vec<&Bounded>, Vec<&Bounded>) =
+            bounds.iter().partition(|bound| bound.given_up);
+        let excess: f64 = given_up.iter().map(|bound| bound.excess().max(0.0)).sum();
+        let objectives = self.objectives(physical).into_iter();
+        let limits = kept.into_iter().map(Bounded::judged);
         Judged {
-            objectives: self.objectives(physical),
-            limits: bounds.iter().map(Bounded::judged).collect(),
+            objectives: objectives.map(|of| of - GIVEN_UP * excess).collect(),
+            // No such design meets all limits.
+            limits: limits.chain((excess > MET).then_some(2.0 * MET)).collect(),
         }
     }
 
@@ -645,6 +651,13 @@ impl<'a> ArrayProblem<'a> {
     pub fn index(&self, axis: Axis) -> Option<usize> {
         self.space.axes().iter().position(|known| *known == axis)
     }
+}
+
+/// Whether the limits are met that the search did not give up.
+pub(super) fn keeps_others(bounds: &[Bounded]) -> bool {
+    bounds
+        .iter()
+        .all(|bound| bound.given_up || !bound.is_broken())
 }
 
 /// Whether what whole layers and turns give is within the ranges of the search.

@@ -9,7 +9,9 @@ use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Problem, Search, Settings};
 
 use super::choice::{Choice, choices};
-use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges};
+use super::problem::{
+    ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges, keeps_others,
+};
 use super::space::Space;
 use crate::limits::LimitName;
 
@@ -75,10 +77,13 @@ impl Candidate {
         self.bounds.iter().all(Bounded::is_met)
     }
 
-    /// The larger, the better: whether it meets every limit, whether it is in the search's ranges, then its merit.
-    fn rank(&self, problem: &ArrayProblem) -> (bool, bool, f64) {
+    /// The larger, the better: whether it meets every limit, at least those that were not given up, whether it is in the
+    /// search's ranges, then its merit.
+    fn rank(&self, problem: &ArrayProblem) -> (bool, bool, bool, f64) {
         let judged = problem.judged(Some(&self.physical), &self.bounds);
-        (self.is_feasible(), in_ranges(&self.bounds), judged.merit())
+        let keeps = keeps_others(&self.bounds);
+        let ranged = in_ranges(&self.bounds);
+        (self.is_feasible(), keeps, ranged, judged.merit())
     }
 
     /// The design at `x` to full accuracy.
@@ -215,7 +220,7 @@ impl Found<'_> {
             .problem
             .best(&self.search)
             .filter(|(_, judged)| judged.excess() <= MET);
-        if since.is_none_or(|(_, judged)| judged.merit() <= known.2 + WORTH) {
+        if since.is_none_or(|(_, judged)| judged.merit() <= known.3 + WORTH) {
             return Ok(false);
         }
         let before = self.search.samples().len();
