@@ -164,19 +164,24 @@ impl Overwrite {
         &self.inputs
     }
 
-    /// Refuses when `target`, which exists, must not be replaced, or its folder, which exists, not be written to. Call it
-    /// before a long computation too; writing checks again.
+    /// Refuses when `target`, which exists, must not be replaced, or its folder, or the one that it is made in, not be
+    /// written to. Call it before a long computation too; writing checks again.
     ///
     /// # Errors
     /// [`WriteError::OutputExists`], [`WriteError::Protected`], [`WriteError::IsFolder`]; the system's.
     pub fn check(&self, target: &Path) -> Result<(), WriteError> {
         self.permit(target, None)?;
         let fail = |error| WriteError::from_io("write", target, error);
-        match Dir::open(parent_of(&real(target).map_err(fail)?)) {
-            Ok(folder) => folder.writable().map_err(fail),
-            // It is made, or the system says then why not.
-            Err(_) => Ok(()),
+        let real = real(target).map_err(fail)?;
+        // Folders that are not there are made in the nearest one that is.
+        for folder in real.ancestors().skip(1) {
+            match Dir::open(parent_of(&folder.join("-"))) {
+                Ok(folder) => return folder.writable().map_err(fail),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(fail(error)),
+            }
         }
+        Ok(())
     }
 
     /// How a file of these bytes takes its place at `target`; without bytes, as far as can be known.
