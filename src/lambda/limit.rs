@@ -13,7 +13,7 @@
 //! these, in the share of the area that is in blocks. The largest difference, with a margin, is the
 //! estimate. The least force over all places is no mean: with the currents that hold it at the
 //! points it may be smaller between them. Where it bends evenly it is taken for a parabola, elsewhere for any convex
-//! function.
+//! function; of the samples every second one is taken.
 //!
 //! Points that count alike give another limit than the object's, off by the first power of the
 //! spacing: their border counts twice. The difference from the same points by area is in the first one.
@@ -139,10 +139,16 @@ pub fn limit_error(
     let of_spacing = match settings.criterion {
         Criterion::Maxmin => {
             let rows = Rows::of(problem, areas, fine.map(|fine| (fine, fine.areas)));
-            match maxmin(&rows.problem(problem))? {
+            let between = match maxmin(&rows.problem(problem))? {
                 Some(found) => places.below(problem, areas, &found),
                 None => ALL,
-            }
+            };
+            let of_samples = |fine: FineSamples| {
+                largest(&[0, 1], |&which| {
+                    differs(areas, Some(&every_other(fine.areas, which)))
+                })
+            };
+            between + fine.map_or(Ok(0.0), of_samples)?
         }
         _ => spacing_off(places, areas, (of_cells, fine), differs)?,
     };
@@ -217,6 +223,15 @@ fn largest<T: Sync>(
     let found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
     let most = found.into_iter().flatten().reduce(f64::max);
     Ok(most.unwrap_or(ALL))
+}
+
+/// The weights of the `which`-th of every two samples.
+fn every_other(areas: &[f64], which: usize) -> Vec<f64> {
+    let weight = |(sample, area): (usize, &f64)| match sample % 2 == which {
+        true => *area,
+        false => 0.0,
+    };
+    areas.iter().enumerate().map(weight).collect()
 }
 
 /// By how much a function may be below the smaller of its values at two places, `inner`, where `left` and `right` are
@@ -329,7 +344,7 @@ impl GridPlaces<'_> {
         ((constant - lowest) / constant).clamp(0.0, ALL)
     }
 
-    /// The place next to one along x (0) or y (1), where the cells on both sides of the way there are smooth.
+    /// The place next to one along x (0) or y (1), where a cell beside the way there is smooth.
     fn beside(&self, place: usize, axis: usize, onwards: bool) -> Option<usize> {
         let at = [place % self.columns, place / self.columns];
         let samples = [self.columns, self.rows];
@@ -344,10 +359,10 @@ impl GridPlaces<'_> {
         let sides = [from[across].checked_sub(1), Some(from[across])];
         let mut sides = sides.into_iter().flatten();
         let smooth = samples[across] == 1
-            || sides.all(|side| {
+            || sides.any(|side| {
                 let mut cell = from;
                 cell[across] = side;
-                side + 1 >= samples[across] || self.is_smooth(cell[0], cell[1])
+                side + 1 < samples[across] && self.is_smooth(cell[0], cell[1])
             });
         let step = [1, self.columns][axis];
         smooth.then_some(if onwards { place + step } else { place - step })
