@@ -27,6 +27,8 @@ pub struct ShapeSource {
     pub input: Option<Input>,
 }
 
+/// Refuses shapes whose results could not be kept apart.
+///
 /// # Errors
 /// Two shapes of one name.
 pub fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {

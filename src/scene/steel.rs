@@ -467,7 +467,7 @@ pub(super) fn solve_with(
         linear,
         lowest_m,
         above_knee_t,
-        smaller_currents: smaller_currents.clone(),
+        smaller_currents,
         prepared: PreparedField::default(),
     };
     if coupled(scene.design) {

@@ -22,7 +22,7 @@ use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
 
 /// Deviation from superposition above which a warning is due.
-const SUPERPOSITION_WARNING: f64 = 0.01;
+pub(crate) const SUPERPOSITION_WARNING: f64 = 0.01;
 
 /// The cores at a working point.
 #[derive(Debug, Clone)]

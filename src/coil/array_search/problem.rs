@@ -182,6 +182,11 @@ impl Bounded {
         self.excess() <= ROUNDING
     }
 
+    /// The same, or that the search gave it up.
+    pub(super) fn is_met_or_given_up(&self) -> bool {
+        self.given_up || self.is_met()
+    }
+
     /// What a search takes for the excess: above [`MET`] where the limit is broken, or may be once lengths are rounded.
     fn judged(&self) -> f64 {
         let excess = self.excess() + self.margin;
@@ -420,7 +425,8 @@ impl<'a> ArrayProblem<'a> {
             let physical = self.properties(sample)?;
             let bounds = self.bounds(&sample.x, Some(&physical));
             let judged = self.judged(Some(&physical), &bounds);
-            let rank = (keeps_others(&bounds), in_ranges(&bounds), judged.merit());
+            let keeps_others = bounds.iter().all(|b| b.given_up || !b.is_broken());
+            let rank = (keeps_others, in_ranges(&bounds), judged.merit());
             rank.2.is_finite().then_some((rank, sample, judged))
         });
         let best = ranked.reduce(|a, b| if b.0 > a.0 { b } else { a });
@@ -651,13 +657,6 @@ impl<'a> ArrayProblem<'a> {
     pub fn index(&self, axis: Axis) -> Option<usize> {
         self.space.axes().iter().position(|known| *known == axis)
     }
-}
-
-/// Whether the limits are met that the search did not give up.
-pub(super) fn keeps_others(bounds: &[Bounded]) -> bool {
-    bounds
-        .iter()
-        .all(|bound| bound.given_up || !bound.is_broken())
 }
 
 /// Whether what whole layers and turns give is within the ranges of the search.

@@ -9,9 +9,7 @@ use fluxform_design::Design;
 use fluxform_numerics::mixed_search::{MET, Problem, Search, Settings};
 
 use super::choice::{Choice, choices};
-use super::problem::{
-    ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges, keeps_others,
-};
+use super::problem::{ArrayProblem, Bounded, Level, Objective, Physical, Physics, Room, in_ranges};
 use super::space::Space;
 use crate::limits::LimitName;
 
@@ -81,9 +79,9 @@ impl Candidate {
     /// search's ranges, then its merit.
     fn rank(&self, problem: &ArrayProblem) -> (bool, bool, bool, f64) {
         let judged = problem.judged(Some(&self.physical), &self.bounds);
-        let keeps = keeps_others(&self.bounds);
+        let keeps_others = self.bounds.iter().all(Bounded::is_met_or_given_up);
         let ranged = in_ranges(&self.bounds);
-        (self.is_feasible(), keeps, ranged, judged.merit())
+        (self.is_feasible(), keeps_others, ranged, judged.merit())
     }
 
     /// The design at `x` to full accuracy.

@@ -178,7 +178,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
     sheet.finish()
 }
 
-/// What tells five time constants from what a current loop takes, where there is one.
+/// Beside five time constants, where a current loop takes another time.
 fn by_voltage(design: &Design) -> &'static str {
     match design.supply.driver {
         Driver::Current => " at a constant voltage",

@@ -11,7 +11,7 @@ use super::{ForcePoints, LambdaOptions, PosedProblem};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::force_direction::RequestedForce;
-use crate::lambda::{self, ForceProblem};
+use crate::lambda::{self, Criterion, ForceProblem};
 use crate::numerics::spread::spread;
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -63,12 +63,20 @@ impl PosedProblem<'_> {
             progress,
         };
         let found = (self.points).error_against_limit(lambda, problems, with, at)?;
+        let compared = match self.options.settings.criterion {
+            Criterion::Maxmin => {
+                "the force between the points with the currents that hold it there"
+            }
+            Criterion::Linear | Criterion::Jnd | Criterion::Saturation => {
+                "every second point in four ways"
+            }
+        };
         Ok(found.map(|estimate| StageAccuracy {
             estimate,
             relative_to: "lambda".to_owned(),
             method: format!(
-                "an estimate against the limit of ever more points: what every second point in four \
-                 ways and finer samples of broken cells change{}{}",
+                "an estimate against the limit of ever more points: what {compared} and finer samples of broken cells \
+                 change{}{}",
                 if self.problem.weights.is_some() {
                     ""
                 } else {

@@ -29,6 +29,7 @@ use crate::lambda::two_fingers::FingerMagnet;
 use crate::progress::Progress;
 use crate::scene::finger_magnet;
 use crate::scene::steel::SMALLER_CURRENTS;
+use crate::scene::working_point::SUPERPOSITION_WARNING;
 use felt::Felt;
 use follow::{Follower, Steps};
 use page::Below;
@@ -38,8 +39,6 @@ use synthesize::Synthesis;
 
 /// Of a lone coil in the drawing of a bundle that holds no design.
 const UNKNOWN_RADIUS_M: f64 = 0.01;
-/// What forces per ampere differ by, of smaller currents, from which on that is said.
-const WARNED: f64 = 0.01;
 /// Positions between two looks at the interruption flag.
 const PORTION: usize = 4096;
 
@@ -176,7 +175,7 @@ impl Opened {
     /// A sentence where smaller currents give another force per ampere than the bundle's.
     fn of_smaller_currents(&self) -> Option<String> {
         let stage = self.bundle.manifest.accuracy.get(SMALLER_CURRENTS)?;
-        (stage.estimate >= WARNED).then(|| {
+        (stage.estimate >= SUPERPOSITION_WARNING).then(|| {
             format!(
                 "the forces per ampere are those of cores at the largest currents: of smaller ones they are up to {:.2} % \
                  off, which the stated error of the forces allows for; set supply.current_max_a near the currents used \

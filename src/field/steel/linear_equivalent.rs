@@ -159,10 +159,10 @@ impl CoilWithCurve<'_> {
     }
 
     /// How far the gradients per ampere at smaller currents are from those at `current_a`, with a margin for the currents
-    /// between those looked at.
+    /// between those looked at. Those at which no state is found are left out.
     ///
     /// # Errors
-    /// As [`CoilWithCurve::solve`].
+    /// As [`CoilWithCurve::solve`], at `current_a`.
     pub fn smaller_currents(
         &self,
         current_a: f64,
@@ -173,7 +173,13 @@ impl CoilWithCurve<'_> {
         let largest = at(1.0)?.layer;
         let mut all = self.gradient_differences(&largest, &largest)?;
         for share in SMALLER {
-            all = all.or_more(&self.gradient_differences(&largest, &at(share)?.layer)?);
+            match at(share) {
+                Ok(smaller) => {
+                    all = all.or_more(&self.gradient_differences(&largest, &smaller.layer)?);
+                }
+                Err(SaturatedCoilError::Stalled) => {}
+                Err(other) => return Err(other),
+            }
         }
         Ok(all.with(|differs| SMALLER_MARGIN * differs))
     }
