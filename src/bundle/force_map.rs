@@ -7,7 +7,7 @@
 
 use super::load::Bundle;
 use super::npz::MapArrays;
-use fluxform_numerics::lagrange::{ORDER_NODES, around, stencil};
+use fluxform_numerics::lagrange::{ORDER_NODES, Stencil, around, beside, stencil};
 
 /// Coils summed together.
 const GROUP: usize = 4;
@@ -27,8 +27,8 @@ pub struct ForceMap {
     sides_n_per_a: Option<[Vec<[f64; GROUP]>; 2]>,
     /// `[z, y, x]`, N.
     passive_n: Option<Vec<f64>>,
-    /// The largest |force per ampere| of any coil on every plane of nodes, N/A.
-    largest_n_per_a: Vec<f64>,
+    /// The largest |force per ampere| along x, y and z of any coil on every plane of nodes, N/A.
+    largest_n_per_a: Vec<[f64; 3]>,
 }
 
 impl ForceMap {
@@ -67,18 +67,27 @@ impl ForceMap {
         };
         let force_n_per_a = arranged(2, &map.gz_t_per_m_per_a);
         let sides = map.sides();
-        let plane = (ny * nx * groups).max(1);
+        let plane = ny * nx * groups;
         let size = |most: f64, value: &f64| most.max(value.abs());
+        let sides_n_per_a = sides.map(|[gx, gy]| [arranged(0, gx), arranged(1, gy)]);
+        let largest = |level: usize| {
+            [0, 1, 2].map(|axis| {
+                let values = match (&sides_n_per_a, axis) {
+                    (_, 2) => &force_n_per_a,
+                    (Some(sides), _) => &sides[axis],
+                    (None, _) => return 0.0,
+                };
+                let plane = &values[level * plane..(level + 1) * plane];
+                plane.as_flattened().iter().fold(0.0, size)
+            })
+        };
         Self {
             axes_m: [&map.x_m, &map.y_m, &map.z_m].map(|axis| axis.to_vec()),
             coils: map.runtime.current_max_a.len(),
             kept: map.coil.iter().map(|&coil| coil as usize).collect(),
-            largest_n_per_a: force_n_per_a
-                .chunks(plane)
-                .map(|values| values.as_flattened().iter().fold(0.0, size))
-                .collect(),
+            largest_n_per_a: (0..nz).map(largest).collect(),
             force_n_per_a,
-            sides_n_per_a: sides.map(|[gx, gy]| [arranged(0, gx), arranged(1, gy)]),
+            sides_n_per_a,
             passive_n: map.passive_force_n.as_deref().map(<[f64]>::to_vec),
         }
     }
@@ -144,11 +153,21 @@ impl ForceMap {
 
     /// The nodes that take part at a position; `None` outside.
     fn near(&self, position_m: [f64; 3]) -> Option<Near> {
+        Some(self.nodes_of(&self.stencils(position_m)?))
+    }
+
+    fn stencils(&self, position_m: [f64; 3]) -> Option<[Stencil; 3]> {
         let [x, y, z] = &self.axes_m;
-        let (row, rows) = (x.len(), y.len());
-        let x = stencil(x, position_m[0])?;
-        let y = stencil(y, position_m[1])?;
-        let z = stencil(z, position_m[2])?;
+        Some([
+            stencil(x, position_m[0])?,
+            stencil(y, position_m[1])?,
+            stencil(z, position_m[2])?,
+        ])
+    }
+
+    /// The nodes of stencils along x, y and z.
+    fn nodes_of(&self, [x, y, z]: &[Stencil; 3]) -> Near {
+        let [row, rows] = [self.axes_m[0].len(), self.axes_m[1].len()];
         let mut near = Near {
             nodes: [(0, 0.0); MOST_NODES],
             count: 0,
@@ -163,7 +182,50 @@ impl ForceMap {
                 }
             }
         }
-        Some(near)
+        near
+    }
+
+    /// About how far the interpolated force of currents and of the unpowered steel may be off along x, y and z, N:
+    /// where nodes beside those that take part ([`beside`]) would put it, two to four times the error where the map
+    /// resolves the field. Along x and y 0 where the map holds the upward component alone. `None` outside the map.
+    #[must_use]
+    pub fn interpolation_error_n(
+        &self,
+        position_m: [f64; 3],
+        currents_a: &[f64],
+    ) -> Option<[f64; 3]> {
+        let stencils = self.stencils(position_m)?;
+        let mut error_n = [0.0; 3];
+        for (axis, error_n) in error_n.iter_mut().enumerate() {
+            let each_n = |stencils: &[Stencil; 3]| {
+                let near = self.nodes_of(stencils);
+                let mut each_n = vec![0.0; self.coils + 1];
+                let values = match (&self.sides_n_per_a, axis) {
+                    (_, 2) => &self.force_n_per_a,
+                    (Some(sides), _) => &sides[axis],
+                    (None, _) => return each_n,
+                };
+                self.each_sum(&near, values, |coil, sum| {
+                    each_n[coil] = sum * currents_a[coil]
+                });
+                if axis == 2 {
+                    each_n[self.coils] = self.pull_n(&near);
+                }
+                each_n
+            };
+            let given_n = each_n(&stencils);
+            let off_n = |along: usize, other: Stencil| -> f64 {
+                let mut stencils = stencils;
+                stencils[along] = other;
+                let terms = each_n(&stencils).into_iter().zip(&given_n);
+                terms.map(|(other, given)| (other - given).abs()).sum()
+            };
+            for (along, nodes) in self.axes_m.iter().enumerate() {
+                let others = beside(nodes, position_m[along]).into_iter();
+                *error_n += others.map(|other| off_n(along, other)).fold(0.0, f64::max);
+            }
+        }
+        Some(error_n)
     }
 
     /// Hands the interpolated value of every coil with a map to `put`.
@@ -190,13 +252,14 @@ impl ForceMap {
         })
     }
 
-    /// The largest |force per ampere| of any coil on the planes of nodes around a height, N/A.
+    /// The largest |force per ampere| of any coil on the planes of nodes around a height, along x, y and z, N/A; along x
+    /// and y 0 where the map holds the upward component alone.
     #[must_use]
-    pub fn largest_near_n_per_a(&self, z_m: f64) -> f64 {
-        self.largest_n_per_a[around(&self.axes_m[2], z_m)]
-            .iter()
-            .copied()
-            .fold(0.0, f64::max)
+    pub fn largest_near_n_per_a(&self, z_m: f64) -> [f64; 3] {
+        let planes = self.largest_n_per_a[around(&self.axes_m[2], z_m)].iter();
+        planes.fold([0.0; 3], |most, plane| {
+            [0, 1, 2].map(|axis| most[axis].max(plane[axis]))
+        })
     }
 }
 

@@ -60,7 +60,40 @@ pub fn stencil(nodes: &[f64], position: f64) -> Option<Stencil> {
     // The cell [above - 1, above] holds the position; the last node belongs to the last cell.
     let above = nodes.partition_point(|&node| node <= position);
     let start = above.saturating_sub(2).min(nodes.len() - count);
-    let near = &nodes[start..start + count];
+    Some(through(nodes, start..start + count, position))
+}
+
+/// Stencils through other nodes around the place of [`stencil`], and how far their values are from its: where the grid
+/// resolves a function two to four times its error there. Of more than four nodes they are moved by one to either side
+/// as far as there are nodes; fewer are short of either end's, which differ by more. Of one node there are none.
+///
+/// The products of the distances to two such sets of four differ by `4 / (1 + t)` or `4 / (2 - t)` times the central
+/// one's, at the part `t` of a cell, and by `4 / t` or more in the border cells.
+#[must_use]
+pub fn beside(nodes: &[f64], position: f64) -> Vec<Stencil> {
+    let Some(Stencil { start, count, .. }) = stencil(nodes, position) else {
+        return Vec::new();
+    };
+    let end = start + count;
+    let ranges = match nodes.len() {
+        0 | 1 => Vec::new(),
+        2..=ORDER_NODES => vec![start..end - 1, start + 1..end],
+        most => {
+            let before = start.checked_sub(1).map(|start| start..end - 1);
+            let after = (end < most).then(|| start + 1..end + 1);
+            before.into_iter().chain(after).collect()
+        }
+    };
+    let stencils = ranges.into_iter();
+    stencils
+        .map(|range| through(nodes, range, position))
+        .collect()
+}
+
+/// The stencil of a position through a range of at most four nodes.
+fn through(nodes: &[f64], range: Range<usize>, position: f64) -> Stencil {
+    let (start, count) = (range.start, range.len());
+    let near = &nodes[range];
     let mut weights = [0.0; ORDER_NODES];
     for (k, weight) in weights.iter_mut().take(count).enumerate() {
         let (mut above, mut below) = (1.0, 1.0);
@@ -72,11 +105,11 @@ pub fn stencil(nodes: &[f64], position: f64) -> Option<Stencil> {
         }
         *weight = above / below;
     }
-    Some(Stencil {
+    Stencil {
         start,
         count,
         weights,
-    })
+    }
 }
 
 /// The nodes of a grid `[z, y, x]` that take part at a position: found once, applied to as many

@@ -248,3 +248,77 @@ fn picture_and_page_are_there_with_the_table_or_not_at_all() {
     assert!(ran.out.contains("replay.csv"), "{}", ran.out);
     assert!(place.path("r.svg").is_file() && place.path("pages/r.html").is_file());
 }
+
+/// The largest error of the whole map, at the lowest layer, was taken for that of every position and coil: 30 to 400 times
+/// too much, and forces known to less than their size had no warning.
+#[test]
+fn regression_the_map_s_largest_error_was_everywhere() {
+    let place = Place::new();
+    place.write(
+        "flat.toml",
+        "name = \"flat\"\nprimitive = \"flat\"\nheight_mm = 30\nside_mm = 60\n",
+    );
+    for (nodes, known) in [("21, 16", true), ("5, 5", false)] {
+        let [level, up] = [0, 1].map(|k| nodes.split(", ").nth(k).unwrap());
+        let design = format!(
+            "name = \"four\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 60\n\
+             [wire]\ndiameter_mm = 0.7\n[array]\nrows = 2\ncolumns = 2\n[magnet]\n[workspace]\n\
+             x_mm = [-60, 60, {level}]\ny_mm = [-60, 60, {level}]\nz_mm = [10, 80, {up}]\n"
+        );
+        place.write("four.toml", &design);
+        let args = [
+            "calibrate",
+            "four.toml",
+            "flat.toml",
+            "--out",
+            "b",
+            "--no-report",
+            "--force",
+        ];
+        place.run(&args).ends(0);
+        let args = "replay b/four/flat --synthesize scan --duration 2 --out r.csv --report r.html --force --format json";
+        let args: Vec<&str> = args.split(' ').collect();
+        let report = place.run(&args).ends(0).json();
+        let stated = report["accuracy"]["force"]["estimate"].as_f64().unwrap();
+        let warned = report["warnings"]
+            .to_string()
+            .contains("the forces are known to");
+        assert_eq!(warned, !known, "{report:#}");
+        assert!(place.text("r.html").contains("The forces are known to"));
+        let table = place.text("r.csv");
+        let mut lines = table
+            .lines()
+            .map(|line| line.split(',').collect::<Vec<_>>());
+        let names = lines.next().unwrap();
+        let number = |row: &[&str], name: &str| -> f64 {
+            let at = names.iter().position(|other| *other == name).unwrap();
+            row[at].parse().unwrap()
+        };
+        let rows: Vec<Vec<&str>> = lines.collect();
+        let positions = rows.iter().map(|row| row[1..4].join(",") + "\n");
+        place.write(
+            "at.csv",
+            &format!("x_m,y_m,z_m\n{}", positions.collect::<String>()),
+        );
+        let args = [
+            "probe",
+            "four.toml",
+            "at.csv",
+            "--magnet-force",
+            "--format",
+            "json",
+        ];
+        let probed = place.run(&args).ends(0).json();
+        let per_a = probed["columns"]["force_z_n_per_a"].as_array().unwrap();
+        let off = rows.iter().zip(per_a.chunks(4)).map(|(row, per_a)| {
+            let terms = per_a.iter().enumerate();
+            let terms = terms.map(|(coil, per_a)| {
+                per_a.as_f64().unwrap() * number(row, &format!("current_{coil}_a"))
+            });
+            (terms.sum::<f64>() - number(row, "force_n")).abs()
+        });
+        let worst = off.fold(0.0, f64::max);
+        assert!(worst > 1e-5 && stated > worst, "{stated} {worst}");
+        assert!(!known || stated < 10.0 * worst, "{stated} {worst}");
+    }
+}

@@ -163,11 +163,10 @@ impl Follower {
             if answers.any(|answer| answer != Answer::Outside) {
                 let (step, position) = (&steps.first, trajectory.position_m[row]);
                 let certificate = self.renderer.certificate(step, command);
-                let largest = trajectory
-                    .fingers()
-                    .map(|finger| self.renderer.map().largest_near_n_per_a(finger[row][2]));
-                let largest = largest.fold(0.0, f64::max);
-                self.bounds.add(certificate, largest, &flowing);
+                self.bounds.certificate = self.bounds.certificate.max(certificate);
+                for finger in trajectory.fingers() {
+                    self.bounds.add(self.renderer.map(), finger[row], &flowing);
+                }
                 if let Some(felt) = &mut self.felt {
                     felt.add(&self.renderer, position, step, command);
                 }

@@ -288,6 +288,7 @@ pub fn run(
         warnings,
     );
     summary.force.felt = felt;
+    summary.warnings.extend(summary.of_unknown_forces());
     if let Some(two) = &mut summary.two_fingers {
         two.magnets_force_n = pushed_n;
     }

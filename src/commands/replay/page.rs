@@ -34,11 +34,12 @@ pub fn html(report: &ReplayReport, below: &Below) -> String {
     };
     let text = format!(
         "With feedback the force is off by {} (rms), with fixed currents by {}; {} of the time the limits bind, \
-         {} of it is outside the map.",
+         {} of it is outside the map. The forces are known to {} mN.",
         share(&summary.force.feedback),
         share(&summary.force.fixed),
         percent(summary.saturated_time_fraction),
-        percent(summary.outside_time_fraction)
+        percent(summary.outside_time_fraction),
+        figures(summary.force_error_n() * 1e3, 2)
     );
     lead.element("p class=\"lead\"", &text);
     for warning in &summary.warnings {

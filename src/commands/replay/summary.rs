@@ -9,6 +9,7 @@ use super::felt::FeltSummary;
 use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
+use crate::bundle::force_map::ForceMap;
 use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
@@ -16,6 +17,14 @@ use crate::coil::circuit::farthest_from_zero;
 use crate::coil::drive::Drive;
 use crate::force_direction::ForceDirection;
 use crate::scene::steel::{LINEAR_CORES, SMALLER_CURRENTS};
+use crate::units::FORCE_JND;
+
+/// The stage of the forces' errors.
+const FORCE: &str = "force";
+
+/// A map whose largest error is below this resolves the field: nodes beside a position show the error there. Coarser
+/// ones may miss what lies between their nodes.
+const RESOLVED: f64 = 0.5;
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
@@ -275,18 +284,20 @@ impl Followed {
 /// Error bounds, gathered along a trajectory.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
-    /// Of the force per ampere, relative to the largest at the height.
+    /// Of the force per ampere at the nodes, relative to the largest at the height.
     relative: f64,
+    /// The largest between them, along x, y and z, relative to the same.
+    between: [f64; 3],
     /// What it differs by at smaller currents.
     smaller_currents: f64,
     /// The currents that the forces per ampere hold at, at most, A.
     most_a: f64,
-    /// Of the unpowered steel's pull, N.
+    /// Of the unpowered steel's pull between the nodes, N.
     passive_n: f64,
     /// The largest of the force, N.
     force_n: f64,
     /// The largest of the allocation's certificates.
-    certificate: f64,
+    pub(super) certificate: f64,
 }
 
 impl Bounds {
@@ -296,8 +307,13 @@ impl Bounds {
         let runtime = &bundle.map.runtime;
         let limits_a = runtime.current_min_a.iter().chain(&runtime.current_max_a);
         let passive = manifest.map.passive_force.as_ref();
+        let sides = manifest.map.sides.as_ref();
         Self {
-            relative: manifest.map.interpolation.largest_error + stage("map") + stage(LINEAR_CORES),
+            relative: stage("map") + stage(LINEAR_CORES),
+            between: {
+                let [x, y] = sides.map_or([0.0; 2], |sides| sides.largest_error);
+                [x, y, manifest.map.interpolation.largest_error]
+            },
             smaller_currents: stage(SMALLER_CURRENTS),
             most_a: limits_a.fold(0.0, |most, limit| most.max(limit.abs())),
             passive_n: passive.map_or(0.0, |p| p.interpolation.largest_error * p.largest_n.abs()),
@@ -306,17 +322,32 @@ impl Bounds {
         }
     }
 
-    /// A position with its currents, where `largest_n_per_a` is the largest force per ampere.
-    pub(super) fn add(&mut self, certificate: f64, largest_n_per_a: f64, currents_a: &[f64]) {
-        let sizes_a = currents_a.iter().map(|current| current.abs());
-        let off_a = sizes_a.map(|size_a| {
+    /// A position of a finger with the currents that flow.
+    pub(super) fn add(&mut self, map: &ForceMap, position_m: [f64; 3], currents_a: &[f64]) {
+        let Some(local_n) = map.interpolation_error_n(position_m, currents_a) else {
+            return;
+        };
+        let largest_n_per_a = map.largest_near_n_per_a(position_m[2]);
+        let sizes_a = || currents_a.iter().map(|current| current.abs());
+        let off_a = sizes_a().map(|size_a| {
             // Along the curve a smaller current gives no more force than a larger one, and nearly that one's close to it.
             let left_a = (self.most_a - size_a).max(0.0);
             self.relative * size_a + (self.smaller_currents * size_a).min(left_a)
         });
-        let bound = largest_n_per_a * off_a.sum::<f64>() + self.passive_n;
-        self.force_n = self.force_n.max(bound);
-        self.certificate = self.certificate.max(certificate);
+        let at_nodes_n = largest_n_per_a[2] * off_a.sum::<f64>();
+        // The manifest's figure is the largest of the whole map, and adds up over the coils.
+        let sum_a: f64 = sizes_a().sum();
+        let stated_n = |axis: usize| self.between[axis] * largest_n_per_a[axis] * sum_a;
+        let [x, y, up] = [0, 1, 2].map(|axis| {
+            let passive_n = if axis == 2 { self.passive_n } else { 0.0 };
+            let stated_n = stated_n(axis) + passive_n;
+            if self.between[axis] < RESOLVED {
+                local_n[axis].min(stated_n)
+            } else {
+                stated_n
+            }
+        });
+        self.force_n = self.force_n.max(at_nodes_n + x.hypot(y).hypot(up));
     }
 
     /// Currents chosen for uncertainties or for two fingers (`other`) are not those of eq. 8, whose conditions are
@@ -334,12 +365,14 @@ impl Bounds {
         };
         let mut stages = BTreeMap::from([
             (
-                "force",
+                FORCE,
                 stage(
                     self.force_n,
                     "absolute, N: the largest over the positions",
-                    "the map's stated errors, at and between its nodes, and what it leaves of the cores' B-H curve, \
-                     times the largest force per ampere at the height and the sum of the currents' sizes",
+                    "the map's stated errors at its nodes, and what it leaves of the cores' B-H curve, times the largest \
+                     force per ampere at the height and the sum of the currents' sizes; and between the nodes how far \
+                     interpolation through others beside them is off at the position, or the map's largest stated \
+                     error where that is smaller, or half of the force and more",
                 ),
             ),
             (
@@ -419,6 +452,24 @@ impl ReplaySummary {
             warnings,
             files: Vec::new(),
         }
+    }
+
+    /// Estimate of the forces' error, N.
+    pub(super) fn force_error_n(&self) -> f64 {
+        self.accuracy[FORCE].estimate
+    }
+
+    /// A sentence where a finger notices the forces' error.
+    pub(super) fn of_unknown_forces(&self) -> Option<String> {
+        let (error_n, wanted_n) = (self.force_error_n(), self.force.wanted_max_n);
+        (error_n > FORCE_JND * wanted_n && wanted_n > 0.0).then(|| {
+            format!(
+                "the forces are known to {:.2} mN only, {:.0} % of the largest one requested: the errors stated here leave that \
+                 out; take more nodes in [workspace] or a smaller --tolerance and calibrate again",
+                1e3 * error_n,
+                100.0 * error_n / wanted_n
+            )
+        })
     }
 }
 

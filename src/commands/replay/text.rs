@@ -128,7 +128,8 @@ fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
             ),
         );
     }
-    if let Some(stage) = summary.accuracy.get("force").filter(|s| s.estimate > 0.0) {
+    let error_n = summary.force_error_n();
+    if error_n > 0.0 {
         let optimality = summary
             .accuracy
             .get("allocation")
@@ -137,7 +138,7 @@ fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
             "accuracy",
             &format!(
                 "forces to {} N by the map's stated errors{}",
-                error(stage.estimate),
+                error(error_n),
                 optimality.unwrap_or_default()
             ),
         );
