@@ -16,7 +16,10 @@ use crate::coil::circuit::Circuit;
 use crate::coil::mutual::{self, slowest_inductance_h};
 use crate::field::components::Components;
 use crate::field::iron::array::IronPeaks;
-use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::core_flux_density::{CoreField, peak_depth_m};
+
+/// Whose flux density is looked at.
+const CORES_AT_RATED: &str = "a core of the array with all coils at their rated currents";
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
@@ -193,10 +196,15 @@ fn array(
     accuracy.insert("mutual_inductance", stage);
     accuracy.extend(solved.linear_flux().map(|stage| (LINEAR_CORES, stage)));
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
+    let knee_t = scene
+        .core
+        .as_ref()
+        .map_or(f64::INFINITY, |core| core.knee_t);
     let rated_a = scene.rated_currents_a();
     let working_point = match WorkingPoint::new(scene, &solved, &rated_a, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
+            accuracy.extend(core_field_stages(point.core_field_errors));
             peak_t.clone_from(&point.peak_field_t);
             mean_t.clone_from(&point.mean_field_t);
             Some(working_point_summary(scene, &solved, &point, &air)?)
@@ -208,14 +216,36 @@ fn array(
         let inside = array.core_fields(&rated_a, depth_m)?;
         peak_t = inside.iter().map(|field| field.peak_t).collect();
         mean_t = inside.iter().map(|field| field.mean_t).collect();
-        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
+        let largest = |error: fn(&CoreField) -> f64| inside.iter().map(error).fold(0.0, f64::max);
+        let errors = [
+            largest(|field| field.peak_error),
+            largest(|field| field.mean_error),
+        ];
+        accuracy.extend(core_field_stages(errors));
         warnings.extend(above_knee(
             inside
                 .iter()
                 .map(|field| (field.peak_t, field.peak_error * field.peak_t)),
             knee_t,
-            "a core of the array with all coils at their rated currents",
+            CORES_AT_RATED,
             FOR_CORES,
+        ));
+    }
+    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
+    if working_point.is_some() && most_t > knee_t {
+        warnings.push(format!(
+            "{CORES_AT_RATED} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
+             proportion to the currents"
+        ));
+    }
+    let limit_t = scene
+        .design
+        .limits
+        .core_field_max_t
+        .filter(|limit_t| most_t > *limit_t);
+    if let Some(limit_t) = limit_t {
+        warnings.push(format!(
+            "{CORES_AT_RATED} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
         ));
     }
     let iron = match solved.iron_peaks(scene, &rated_a)? {
@@ -255,6 +285,27 @@ fn coils(scene: &Scene, matrix_h: &[Vec<f64>], fields_t: [&[f64]; 2]) -> Vec<Arr
         }
     })
     .collect()
+}
+
+/// How sure the flux densities in the array's cores are: the largest ones and the means.
+fn core_field_stages([peak, mean]: [f64; 2]) -> [(&'static str, StageAccuracy); 2] {
+    let stage = |estimate, relative_to: &str| {
+        StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: "of the solution, and along a B-H curve what saturation takes off the modes across the axis".to_owned(),
+    }
+    };
+    [
+        (
+            "array_core_field",
+            stage(peak, "the largest peak of a core of the array"),
+        ),
+        (
+            "array_core_field_mean",
+            stage(mean, "the largest mean of a core of the array"),
+        ),
+    ]
 }
 
 /// The windings' inductance matrix without steel, H, and the relative error of its entries, to

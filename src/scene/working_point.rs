@@ -10,7 +10,7 @@ use crate::accuracy::StageAccuracy;
 use crate::field::components::Components;
 use crate::field::steel::array_steel::{ALONG_CURVE, SteelField};
 use crate::field::steel::bh_curve::BhCurve;
-use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::core_flux_density::{CoreField, peak_depth_m};
 use crate::field::steel::equivalent_dipoles::ArraySources;
 use crate::field::steel::saturated::Convergence;
 use crate::field::steel::saturated_array::SaturatedArray;
@@ -30,10 +30,13 @@ pub struct WorkingPoint {
     /// Current in every coil, A.
     pub currents_a: Vec<f64>,
     /// Largest |B| in every core, T: of the axisymmetric mode along the curve, and what the other
-    /// modes add to it in the linear array.
+    /// modes add to it in the linear array, less in the proportion in which the curve's is below the linear one's.
     pub peak_field_t: Vec<f64>,
-    /// Mean |B| in every core, of the axisymmetric mode, T.
+    /// Mean |B| in every core, T, likewise.
     pub mean_field_t: Vec<f64>,
+    /// Estimated errors of both, relative to the largest of the cores: that of the state, and what that proportion takes
+    /// off.
+    pub core_field_errors: [f64; 2],
     /// Flux linkage of every coil, the neighbours' windings left out, Wb.
     pub steel_flux_linkage_wb: Vec<f64>,
     /// Estimated error of the total gradient above, relative to the largest |grad B| at the
@@ -81,11 +84,13 @@ impl WorkingPoint {
             Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
         };
         if let Some(array) = solved.steel().coupled() {
-            let depth_m = peak_depth_m(core.shape);
-            let added = array.transverse_peaks_t(&effective_a, depth_m)?;
-            for (peak, added) in made.peak_field_t.iter_mut().zip(added) {
-                *peak += added;
-            }
+            let [all, axial] =
+                array.core_fields_and_axial(&effective_a, peak_depth_m(core.shape))?;
+            let peak = |field: &CoreField| field.peak_t;
+            let mean = |field: &CoreField| field.mean_t;
+            let [peak_error, mean_error] = &mut made.core_field_errors;
+            *peak_error += add_transverse(&mut made.peak_field_t, [&all, &axial], peak);
+            *mean_error += add_transverse(&mut made.mean_field_t, [&all, &axial], mean);
         }
         made.currents_a = currents_a.to_vec();
         Ok(Some(made))
@@ -119,6 +124,7 @@ impl WorkingPoint {
             mean_field_t: array.fields.iter().map(|f| f.mean_b_t).collect(),
             steel_flux_linkage_wb: array.flux_linkage_wb.clone(),
             relative_error: array.relative_error,
+            core_field_errors: [array.relative_error; 2],
             tolerance,
             cores: Cores::Coupled(Box::new(array)),
         })
@@ -157,14 +163,18 @@ impl WorkingPoint {
                 .map(|(current, state)| state.as_ref().map_or(0.0, |state| pick(*current, state)))
                 .collect()
         };
+        let largest =
+            |pick: &dyn Fn(f64, &SaturatedCoil) -> f64| of(pick).into_iter().fold(0.0, f64::max);
         Ok(Self {
             currents_a: Vec::new(),
             peak_field_t: of(&|_, state| state.inside.peak_b_t),
             mean_field_t: of(&|_, state| state.inside.mean_b_t),
             steel_flux_linkage_wb: of(&|current, state| current * state.added_inductance_h),
-            relative_error: of(&|_, state| state.relative_error)
-                .into_iter()
-                .fold(0.0, f64::max),
+            relative_error: largest(&|_, state| state.relative_error),
+            core_field_errors: [
+                largest(&|_, state| state.peak_error),
+                largest(&|_, state| state.mean_error),
+            ],
             tolerance,
             cores: Cores::Alone(states),
         })
@@ -308,6 +318,32 @@ impl WorkingPoint {
             }
         }
         Ok(total)
+    }
+}
+
+/// Adds to fields of the axisymmetric mode along the curve what the other modes add in the linear array, whose fields with
+/// and without them are `linear`, and returns the error of that, relative to the largest.
+fn add_transverse(
+    along_t: &mut [f64],
+    [all, axial]: [&[CoreField]; 2],
+    of: impl Fn(&CoreField) -> f64,
+) -> f64 {
+    let (mut largest_t, mut left_out_t) = (0.0_f64, 0.0_f64);
+    for (along_t, (all, axial)) in along_t.iter_mut().zip(all.iter().zip(axial)) {
+        let (added_t, axial_t) = ((of(all) - of(axial)).max(0.0), of(axial));
+        let part = if *along_t < axial_t {
+            *along_t / axial_t
+        } else {
+            1.0
+        };
+        left_out_t = left_out_t.max((1.0 - part) * added_t);
+        *along_t += part * added_t;
+        largest_t = largest_t.max(*along_t);
+    }
+    if left_out_t > 0.0 {
+        left_out_t / largest_t
+    } else {
+        0.0
     }
 }
 

@@ -5,6 +5,7 @@ mod assumed;
 mod budget;
 mod cache;
 mod codes;
+mod core_field;
 mod error_target;
 mod files;
 mod first_contact;

@@ -10,17 +10,15 @@ use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::placement::Placed;
 use super::lambda::{ForcePoints, LambdaOptions, LambdaReport, sideways, solve_at, uncertain};
 use super::made_with::surface;
-use super::map::{arrays, runtime, summary};
+use super::map::{add_pull, arrays, passive_map, runtime, summary};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
 use crate::bundle::json::displayed;
-use crate::bundle::manifest::{
-    CircuitSummary, Interpolation, LambdaSummary, MadeWith, Manifest, PassiveForce,
-};
-use crate::bundle::npz::{PASSIVE, Runtime};
+use crate::bundle::manifest::{CircuitSummary, LambdaSummary, MadeWith, Manifest};
+use crate::bundle::npz::Runtime;
 use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::CurrentRow;
 use crate::bundle::timing::StageSeconds;
@@ -29,15 +27,12 @@ use crate::design::Design;
 use crate::force_direction::RequestedForce;
 use crate::lambda::Settings;
 use crate::lambda::uncertainty::RobustRuntime;
-use crate::map::FieldMap;
-use crate::map::tabulate::Grid;
 use crate::progress::Progress;
 use crate::report::bundle_files;
 use crate::scene::Scene;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField, SteelPart};
 use crate::scene::named_files::NamedContent;
 use crate::scene::neighbours;
-use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::shard::Shard;
 use crate::scene::sources::{DesignSource, ShapeSource, check_names};
@@ -65,9 +60,6 @@ use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
-
-/// The stage of the map of the unpowered steel's pull among a bundle's accuracies.
-pub const PASSIVE_STAGE: &str = "passive_force_map";
 
 /// How far from the object's points the map still reaches by default, m: the seed's largest
 /// deviation between finger and surface is 14 mm.
@@ -633,12 +625,7 @@ impl Calibration<'_> {
         accuracy.insert("inductances".to_owned(), self.circuit.accuracy.clone());
         let mut map = summary(&needed.made, needed.components);
         if let Some(passive) = passive {
-            accuracy.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
-            map.passive_force = Some(PassiveForce {
-                array: PASSIVE.to_owned(),
-                largest_n: passive.largest_n,
-                interpolation: Interpolation::tricubic(passive.between, passive.definition()),
-            });
+            add_pull(passive, &mut map, &mut accuracy);
         }
         Manifest {
             schema_version: SCHEMA_VERSION.to_owned(),
@@ -665,26 +652,6 @@ impl Calibration<'_> {
             files: Vec::new(),
         }
     }
-}
-
-/// The unpowered steel's pull on the map's nodes, where the design asks for it.
-fn passive_map(
-    scene: &Scene,
-    map: &FieldMap,
-    progress: &dyn Progress,
-) -> Result<Option<PassiveMap>, RunError> {
-    if !scene.design.magnet.passive_force || scene.steel_extent_m().is_none() {
-        return Ok(None);
-    }
-    progress.begin("passive force", 1);
-    let grid = Grid {
-        x_m: map.x_m.clone(),
-        y_m: map.y_m.clone(),
-        z_m: map.z_m.clone(),
-    };
-    let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
-    progress.end();
-    Ok(passive)
 }
 
 /// Static currents, zero where there is no force constant.

@@ -23,9 +23,9 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, Options, SCHEMA_VERSION, UNITS};
 use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
-    AxisSummary, Interpolation, MapSidecar, MapSummary, SidesOfMap, WorkingPointMap,
+    AxisSummary, Interpolation, MapSidecar, MapSummary, PassiveForce, SidesOfMap, WorkingPointMap,
 };
-use crate::bundle::npz::{MapArrays, Runtime, SIDES, WORKING_POINT};
+use crate::bundle::npz::{MapArrays, PASSIVE, Runtime, SIDES, WORKING_POINT};
 use crate::bundle::write::{Beside, BesideContent, MapFormats, check_map_files, write_map_and};
 use crate::design::Design;
 use crate::map::coupled_map::TableReport;
@@ -35,9 +35,14 @@ use crate::plot::slices::SlicesPlot;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::maps::{MagnetMean, SceneMap};
+use crate::scene::passive::PASSIVE_TOLERANCE;
+use crate::scene::passive_map::PassiveMap;
 use crate::scene::steel::{self, Solved};
 use crate::scene::tolerances::ErrorTarget;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
+
+/// The stage of the unpowered steel's pull over a map.
+pub const PASSIVE_STAGE: &str = "passive_force_map";
 
 /// The options of `map`.
 #[derive(Debug, Clone, PartialEq)]
@@ -221,6 +226,12 @@ pub fn run(
         summary.working_point = Some(together.summary.clone());
         arrays.working_point_gz_t_per_m = Some(Cow::Borrowed(&together.gz_t_per_m));
     }
+    let mut accuracy = made.accuracy();
+    let passive = passive_map(&scene, &made.map.map, progress)?;
+    if let Some(passive) = &passive {
+        add_pull(passive, &mut summary, &mut accuracy);
+        arrays.passive_force_n = Some(Cow::Borrowed(&passive.force_z_n));
+    }
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -231,7 +242,7 @@ pub fn run(
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
         map: summary,
-        accuracy: made.accuracy(),
+        accuracy,
         files: Vec::new(),
     };
     progress.begin("write", 1);
@@ -259,6 +270,40 @@ pub fn run(
     let picture = (request.picture).then(|| picture(design, &arrays, &scene.rated_currents_a()));
     drop(arrays);
     Ok(made.report(&scene, request, sidecar, picture))
+}
+
+/// The unpowered steel's pull on the map's nodes, where the design asks for it.
+pub(crate) fn passive_map(
+    scene: &Scene,
+    map: &FieldMap,
+    progress: &dyn Progress,
+) -> Result<Option<PassiveMap>, RunError> {
+    if !scene.design.magnet.passive_force || scene.steel_extent_m().is_none() {
+        return Ok(None);
+    }
+    progress.begin("passive force", 1);
+    let grid = Grid {
+        x_m: map.x_m.clone(),
+        y_m: map.y_m.clone(),
+        z_m: map.z_m.clone(),
+    };
+    let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
+    progress.end();
+    Ok(passive)
+}
+
+/// Adds the pull to a map's description and its stages.
+pub(crate) fn add_pull(
+    passive: &PassiveMap,
+    map: &mut MapSummary,
+    accuracy: &mut BTreeMap<String, StageAccuracy>,
+) {
+    accuracy.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
+    map.passive_force = Some(PassiveForce {
+        array: PASSIVE.to_owned(),
+        largest_n: passive.largest_n,
+        interpolation: Interpolation::tricubic(passive.between, passive.definition()),
+    });
 }
 
 /// The maps of `design` in memory, nothing written.

@@ -67,10 +67,14 @@ pub(super) fn summary(design: &Design, report: &MapReport) -> String {
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
+    let pull = map.passive_force.as_ref().map_or_else(String::new, |pull| {
+        let off = error(pull.interpolation.largest_error);
+        format!("\nand {off} of the unpowered steel's largest pull there")
+    });
     sheet.line(
         "between",
         &format!(
-            "nodes {} of the largest |dBz/dz| at that height, with {}",
+            "nodes {} of the largest |dBz/dz| at that height, with {}{pull}",
             error(map.interpolation.largest_error),
             map.interpolation.name
         ),

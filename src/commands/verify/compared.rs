@@ -21,8 +21,8 @@ use crate::bundle::npz::{Array, PASSIVE};
 use crate::bundle::rendering::ROBUST;
 use crate::bundle::seal::to_record;
 use crate::bundle::table::PointRow;
-use crate::commands::calibrate::PASSIVE_STAGE;
 use crate::commands::calibrate::again::Expected;
+use crate::commands::map::PASSIVE_STAGE;
 
 /// Differences that are named.
 const NAMED: usize = 6;

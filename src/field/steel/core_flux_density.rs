@@ -256,9 +256,30 @@ impl CoupledArray {
     /// # Errors
     /// A point on the winding's edge: the cores are not in the bores.
     pub fn core_fields(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
-        let cores = self.cores(&Incident::new(self), currents_a);
+        self.fields_in(&self.cores(&Incident::new(self), currents_a), depth_m)
+    }
+
+    /// [`CoupledArray::core_fields`] of every core, and the same of the axisymmetric mode alone.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn core_fields_and_axial(
+        &self,
+        currents_a: &[f64],
+        depth_m: f64,
+    ) -> Result<[Vec<CoreField>; 2], OnEdge> {
+        let mut cores = self.cores(&Incident::new(self), currents_a);
+        let all = self.fields_in(&cores, depth_m)?;
+        for core in &mut cores {
+            let columns = core.layers.ncols();
+            core.layers.columns_mut(1, columns - 1).fill(0.0);
+        }
+        Ok([all, self.fields_in(&cores, depth_m)?])
+    }
+
+    fn fields_in(&self, cores: &[Core], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
         let (outline, winding) = (&self.response.outline, &self.winding);
-        let fields = core_fields(outline, winding, &cores, depth_m, LOST_ALONE, VOLUME.order)?;
+        let fields = core_fields(outline, winding, cores, depth_m, LOST_ALONE, VOLUME.order)?;
         Ok(fields
             .into_iter()
             .map(|field| CoreField {
@@ -266,26 +287,6 @@ impl CoupledArray {
                 mean_error: field.mean_error.max(self.relative_error),
                 ..field
             })
-            .collect())
-    }
-
-    /// Part of all other modes in the largest |B| of every core, beyond the axisymmetric mode's, T.
-    ///
-    /// # Errors
-    /// As [`CoupledArray::core_fields`].
-    pub fn transverse_peaks_t(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<f64>, OnEdge> {
-        let inspection = Inspection::new(self, depth_m)?;
-        let mut cores = self.cores(&inspection.incident, currents_a);
-        let all = inspection.peaks_of(self, &cores)?;
-        for core in &mut cores {
-            let columns = core.layers.ncols();
-            core.layers.columns_mut(1, columns - 1).fill(0.0);
-        }
-        let axial = inspection.peaks_of(self, &cores)?;
-        Ok(all
-            .iter()
-            .zip(&axial)
-            .map(|(all, axial)| (all - axial).max(0.0))
             .collect())
     }
 
