@@ -49,7 +49,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> Exit {
     std::panic::set_hook(Box::new(move |panic| {
         Printer::new(&early).mistake(&panic_message(panic));
     }));
-    let parsed = P::command()
+    let parsed = numbers_below_zero(P::command())
         .color(colour_of(&args))
         .try_get_matches_from(&args)
         .and_then(|matches| P::parse(&matches));
@@ -74,6 +74,16 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> Exit {
     }
 }
 
+/// A command whose options take a number below zero as their value, which says what is wrong with it; else it is an unknown
+/// flag.
+fn numbers_below_zero(command: clap::Command) -> clap::Command {
+    let option = |arg: clap::Arg| match arg.is_positional() || !arg.get_action().takes_values() {
+        true => arg,
+        false => arg.allow_negative_numbers(true),
+    };
+    command.mut_args(option).mut_subcommands(numbers_below_zero)
+}
+
 /// Runs a program inside another one, which has the signals, the screen and the threads: nothing is
 /// printed. `given` are documents that are in memory, read in place of the files of their names.
 pub fn captured<P: Program + Send>(
@@ -81,7 +91,7 @@ pub fn captured<P: Program + Send>(
     given: Vec<(PathBuf, String)>,
     watch: Watch,
 ) -> (Captured, Result<(), Failure>) {
-    let parsed = P::command()
+    let parsed = numbers_below_zero(P::command())
         .try_get_matches_from(args)
         .and_then(|matches| P::parse(&matches));
     let program = match parsed {

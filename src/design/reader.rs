@@ -388,9 +388,12 @@ impl<'a> Section<'a> {
         }
         let homes = self.sections_with(name);
         let known = format!("known here: {}", self.known.join(", "));
-        match homes.is_empty() {
-            true => known,
-            false => format!("it is a key of {}; {known}", homes.join(", ")),
+        if homes.is_empty() {
+            known
+        } else if homes.contains(&section_name(&self.path)) {
+            format!("it does not go with the other keys here; {known}")
+        } else {
+            format!("it is a key of {}; {known}", homes.join(", "))
         }
     }
 

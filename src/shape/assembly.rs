@@ -3,6 +3,7 @@
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::memory;
 use crate::number::{F32_ROUNDING, Numbers};
+use fluxform_numerics::vec3::{cross, dot};
 
 /// Placing bodies several times may add so many triangles to those of the file,
 const MOST_ADDED: u64 = 10_000_000;
@@ -52,6 +53,12 @@ impl Affine {
             rows: [0, 1, 2].map(|i| [0, 1, 2].map(|k| columns[k][i])),
             shift: self.apply(inner.shift),
         }
+    }
+
+    /// Whether it turns what looks outwards inside out.
+    fn mirrors(&self) -> bool {
+        let [a, b, c] = self.rows;
+        dot(a, cross(b, c)) < 0.0
     }
 
     /// The magnitudes of its numbers.
@@ -318,7 +325,11 @@ impl Assembly<'_> {
         if *place == Affine::IDENTITY {
             triangles.extend_from_slice(&body.triangles);
         } else {
-            triangles.extend(body.triangles.iter().map(|t| t.map(|v| place.apply(v))));
+            let mirrors = place.mirrors();
+            triangles.extend(body.triangles.iter().map(|triangle| {
+                let [a, b, c] = triangle.map(|v| place.apply(v));
+                if mirrors { [a, c, b] } else { [a, b, c] }
+            }));
         }
         if !body.triangles.is_empty() {
             let (own, far) = self.read[index];
@@ -335,9 +346,27 @@ impl Assembly<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fluxform_numerics::vec3::minus;
 
     fn of(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<FileMesh, String> {
         lay_out(bodies, roots, Fineness::Floats)
+    }
+
+    /// A placement that mirrors turned bodies inside out.
+    #[test]
+    fn regression_what_is_mirrored_was_inside_out() {
+        let body = Body {
+            triangles: vec![[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]],
+            children: Vec::new(),
+        };
+        let mut mirrored = Affine::IDENTITY;
+        mirrored.rows[0][0] = -1.0;
+        let up = |place: Affine| {
+            let file = of(std::slice::from_ref(&body), &[(0, place)]).unwrap();
+            let [a, b, c] = file.triangles[0];
+            cross(minus(b, a), minus(c, a))[2]
+        };
+        assert_eq!([up(Affine::IDENTITY), up(mirrored)], [1.0, 1.0]);
     }
 
     /// Numbers that cancelled took their roundings along: of a part read far away nothing was stated.

@@ -15,8 +15,8 @@ pub(super) fn weld(triangles: &[Triangle], reach: f64) -> Vec<[u32; 3]> {
     triangles.iter().map(named).collect()
 }
 
-/// Parts of the surface that share no vertex.
-pub(super) fn bodies(names: &[[u32; 3]]) -> usize {
+/// Parts of the surface that share no vertex: which of them every triangle is of, and how many there are.
+pub(super) fn parts(names: &[[u32; 3]]) -> (Vec<u32>, usize) {
     let count = names.as_flattened().iter().max().map_or(0, |name| name + 1);
     let mut up: Vec<u32> = (0..count).collect();
     fn root(up: &mut [u32], mut at: u32) -> u32 {
@@ -33,7 +33,17 @@ pub(super) fn bodies(names: &[[u32; 3]]) -> usize {
             up[p.max(q) as usize] = p.min(q);
         }
     }
-    (0..count).filter(|at| up[*at as usize] == *at).count()
+    let mut numbers = vec![u32::MAX; count as usize];
+    let mut parts = 0;
+    let of = names.iter().map(|[a, _, _]| {
+        let number = &mut numbers[root(&mut up, *a) as usize];
+        if *number == u32::MAX {
+            *number = parts;
+            parts += 1;
+        }
+        *number
+    });
+    (of.collect(), parts as usize)
 }
 
 /// How triangles meet.

@@ -6,12 +6,13 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::edges::{Edges, WELD_ROUNDINGS, weld};
+use crate::edges::{Edges, WELD_ROUNDINGS, parts, weld};
 use crate::file_mesh::{Bounds, Triangle};
 use crate::height::{Grid, reach_m};
 use crate::index::Index;
 use crate::mesh::Mesh;
 use crate::point_flags::{Rules, contacts, is_closed, is_oriented};
+use crate::sides::Sides;
 use crate::surface::Surface;
 use crate::vertical_hit::{Contact, is_wall, may_touch};
 use fluxform_numerics::axis::Axis;
@@ -82,19 +83,22 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
     };
     // Ends of the triangles along the whole area, in their order.
     let bounds = mesh.facts().bounds;
-    let (mut area, mut six_volumes) = (0.0, 0.0);
+    let (mut area, mut volume) = (0.0, 0.0);
     let mut ends = Vec::with_capacity(triangles.len());
     for (k, triangle) in triangles.iter().enumerate() {
         let normal = normal(k);
         area += 0.5 * dot(normal, normal).sqrt();
-        six_volumes += dot(minus(triangle[0], bounds.min_m), normal);
+        volume += dot(minus(triangle[0], bounds.min_m), normal);
         ends.push(area);
     }
     // Where facets of a body look to different sides, the sheets above a point tell inside from outside.
     let closed = is_closed(triangles);
     let by_sheets = closed && !is_oriented(triangles);
-    // A body whose triangles look inwards is turned inside out.
-    let outward = if six_volumes < 0.0 { -1.0 } else { 1.0 };
+    let sides = (closed && !by_sheets).then(|| Sides::new(triangles, parts(&weld(triangles, 0.0))));
+    let is_turned = |facet: usize| match &sides {
+        Some(sides) => sides.is_turned(facet),
+        None => volume < 0.0,
+    };
     // Heights alone are requested: of layers nothing.
     let rules = Rules {
         reach_m: reach_m(mesh, &cells(bounds)),
@@ -124,7 +128,7 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         let up = usize::from(if by_sheets {
             above.is_multiple_of(2)
         } else {
-            outward * normal[2] > 0.0
+            (normal[2] > 0.0) != is_turned(facet)
         });
         let covered = usize::from(above > 0);
         [1, covered, up, up * covered]
@@ -292,6 +296,59 @@ mod tests {
         let placed = Transform::new(1e-3, &Placement::default());
         let surface = Surface::Mesh(Mesh::place(file, &placed).unwrap());
         assert_eq!(Hidden::of(&surface).unwrap().of_area, 0.0);
+    }
+
+    /// Of two bodies side by side, one inside out, half of what faces up was an undercut, and the volume nothing; a cavity's
+    /// triangles look into it.
+    #[test]
+    fn regression_one_body_inside_out_hid_the_other() {
+        let cube = |side: f64, at: [f64; 3], inside_out: bool| {
+            let outline = [
+                [0.01 * side, 0.0],
+                [side, 0.0],
+                [side, side],
+                [0.01 * side, side],
+            ];
+            let mut triangles = triangles_of(&outline);
+            for triangle in &mut triangles {
+                *triangle = triangle.map(|corner| [0, 1, 2].map(|i| corner[i] + at[i]));
+                if inside_out {
+                    triangle.swap(0, 1);
+                }
+            }
+            triangles
+        };
+        let volume = |triangles: &[Triangle]| {
+            let names = weld(triangles, 0.0);
+            Sides::new(triangles, parts(&names)).volume
+        };
+        let one = volume(&cube(10.0, [0.0; 3], false));
+        for (at, upward, share) in [
+            // Beside it, and a smaller one over it.
+            ([30.0, 0.0, 0.0], 0.0, 1.0),
+            ([0.0, 0.0, 20.0], 0.09 / 1.09, 0.027),
+        ] {
+            for turned in [[false, true], [true, false], [true, true]] {
+                let side = if upward > 0.0 { 3.0 } else { 10.0 };
+                let other = cube(side, at, turned[1]);
+                let both = [cube(10.0, [0.0; 3], turned[0]), other].concat();
+                let right = one * (1.0 + share);
+                assert!((volume(&both) / right - 1.0).abs() < 1e-12);
+                let found = Hidden::of(&placed(both)).unwrap();
+                let off = found.of_upward.unwrap() - upward;
+                assert!(off.abs() < 0.01, "{found:?} {upward}");
+            }
+        }
+        // A cavity within a body.
+        let hollow = [
+            cube(10.0, [0.0; 3], false),
+            cube(3.0, [0.0, 0.0, 3.0], true),
+        ]
+        .concat();
+        assert!((volume(&hollow) / (one * (1.0 - 0.027)) - 1.0).abs() < 1e-12);
+        let found = Hidden::of(&placed(hollow)).unwrap();
+        let share = found.of_upward.unwrap();
+        assert!((share - 0.09 / 1.09).abs() < 0.01, "{found:?}");
     }
 
     /// Facets turned round made half of a box's upper side an undercut.

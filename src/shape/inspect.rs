@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::bodies::{BodyOptions, NamedBody};
 use crate::crossings::crossings;
 use crate::document::{Placement, SurfaceFormat};
-use crate::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
+use crate::edges::{Edges, WELD_ROUNDINGS, parts, weld};
 use crate::error::ShapeError;
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::height::Grid;
@@ -19,6 +19,7 @@ use crate::hidden::MOST_MET;
 use crate::mesh::Mesh;
 use crate::placement::Transform;
 use crate::scattered::Probe;
+use crate::sides::Sides;
 use crate::surface::{ByteObserver, Surface, read_mesh};
 use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
@@ -72,10 +73,13 @@ pub struct MeshReport {
     pub layers: Option<u32>,
     /// Sum of the triangles' areas.
     pub area: f64,
-    /// Enclosed volume, negative if the triangles look inwards; absent unless watertight and
+    /// Enclosed volume, negative if the triangles of all bodies look inwards; absent unless watertight and
     /// consistent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
+    /// Bodies whose triangles look inwards, where others look outwards.
+    #[serde(skip_serializing_if = "is_none")]
+    pub turned_bodies: usize,
     /// The bodies that the file names, in its order; absent where the format names none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub named_bodies: Vec<NamedBody>,
@@ -170,7 +174,11 @@ impl MeshReport {
         let size = (0..3)
             .map(|k| bounds[1][k] - bounds[0][k])
             .fold(0.0, f64::max);
-        let (area, volume) = area_and_volume(&file.triangles, bounds);
+        let parts = parts(&names);
+        let bodies = parts.1;
+        let enclosed =
+            (watertight && edges.inconsistent == 0).then(|| Sides::new(&file.triangles, parts));
+        let turned = enclosed.as_ref().map_or([0; 2], Sides::counts);
         let guess = |(unit, metres): (&'static str, f64)| UnitGuess {
             unit,
             size_m: size * metres,
@@ -195,14 +203,22 @@ impl MeshReport {
             inconsistent_edges: edges.inconsistent,
             degenerate: file.triangles.iter().filter(flat).count(),
             duplicate: edges.duplicate,
-            bodies: bodies(&names),
+            bodies,
             euler: edges.euler,
             self_intersections: 0,
             self_intersections_complete: false,
             self_intersection_first: None,
             layers: None,
-            area,
-            volume: (watertight && edges.inconsistent == 0).then_some(volume),
+            area: area(&file.triangles),
+            // Inside out as a whole.
+            volume: enclosed.map(|of| {
+                if turned[0] == turned[1] {
+                    -of.volume
+                } else {
+                    of.volume
+                }
+            }),
+            turned_bodies: if turned[0] == turned[1] { 0 } else { turned[1] },
             named_bodies: Vec::new(),
             read_by: None,
             warnings: Vec::new(),
@@ -228,6 +244,10 @@ impl MeshReport {
         say(
             self.inconsistent_edges,
             "edges have triangles that look to different sides; heights do not depend on that",
+        );
+        say(
+            self.turned_bodies,
+            "connected parts have triangles that look inwards, unlike the others; heights do not depend on that",
         );
         say(
             self.degenerate,
@@ -267,17 +287,16 @@ fn bounds(triangles: &[Triangle]) -> [[f64; 3]; 2] {
     bounds
 }
 
-/// Area and signed volume, seen from the middle of the box, where least is lost in the sum.
-fn area_and_volume(triangles: &[Triangle], bounds: [[f64; 3]; 2]) -> (f64, f64) {
-    let middle = [0, 1, 2].map(|k| bounds[0][k] + 0.5 * (bounds[1][k] - bounds[0][k]));
-    let (mut twice_area, mut six_volumes) = (0.0, 0.0);
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|v| minus(v, middle));
-        let normal = cross(minus(b, a), minus(c, a));
-        twice_area += normal[0].hypot(normal[1]).hypot(normal[2]);
-        six_volumes += a[0] * normal[0] + a[1] * normal[1] + a[2] * normal[2];
-    }
-    (0.5 * twice_area, six_volumes / 6.0)
+fn area(triangles: &[Triangle]) -> f64 {
+    let twice = triangles.iter().map(|[a, b, c]| {
+        let normal = cross(minus(*b, *a), minus(*c, *a));
+        normal[0].hypot(normal[1]).hypot(normal[2])
+    });
+    0.5 * twice.sum::<f64>()
+}
+
+fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The most sheets over each other, looked for along vertical lines over the whole box; `None`

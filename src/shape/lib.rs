@@ -74,6 +74,7 @@ mod index;
 mod number;
 mod polygon;
 mod readers;
+mod sides;
 mod text;
 mod tokens;
 mod vertical_hit;

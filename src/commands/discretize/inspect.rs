@@ -143,6 +143,7 @@ pub fn inspect(
     // A mesh without area is no surface, and is reported as that.
     let surface = match Surface::open(document, progress) {
         Ok((surface, _)) => Some(surface),
+        Err(error @ ShapeError::UnitDiffers { .. }) => return Err(failed(error)),
         Err(error) if draw || inspected.placed => return Err(failed(error)),
         Err(_) => None,
     };

@@ -3,7 +3,7 @@
 use kuva::backend::pdf::PdfBackend;
 use kuva::backend::png::PngBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::render::render::Scene;
+use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 /// Pixels of a PNG along a pixel of the drawing: sharp on screens of today and in print.
 const PNG_SCALE: f32 = 2.0;
@@ -36,7 +36,8 @@ impl DrawingFormat {
 pub struct Drawing(Scene);
 
 impl Drawing {
-    pub(super) fn new(scene: Scene) -> Self {
+    pub(super) fn new(mut scene: Scene) -> Self {
+        fit(&mut scene);
         Self(scene)
     }
 
@@ -68,6 +69,49 @@ impl Drawing {
     }
 }
 
+/// Shortens titles over the whole drawing that would leave it.
+fn fit(scene: &mut Scene) {
+    let width = scene.width;
+    let mut within = 0;
+    for element in &mut scene.elements {
+        match element {
+            Primitive::GroupStart { .. } => within += 1,
+            Primitive::GroupEnd => within -= 1,
+            Primitive::Text {
+                x,
+                content,
+                size,
+                anchor: TextAnchor::Middle,
+                rotate: None,
+                ..
+            } if within == 0 => {
+                let room = 2.0 * x.min(width - *x) - f64::from(*size);
+                *content = shortened(content, room / f64::from(*size));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A text of at most so many times its size in width: its beginning and its end.
+fn shortened(text: &str, most: f64) -> String {
+    let wide = |c: &char| match c {
+        'M' | 'W' | 'm' | 'w' => 0.95,
+        'A'..='Z' | '0'..='9' | '_' => 0.72,
+        _ => 0.58,
+    };
+    let mut characters: Vec<char> = text.chars().collect();
+    let width = |of: &[char]| of.iter().map(wide).sum::<f64>();
+    if width(&characters) <= most {
+        return text.to_owned();
+    }
+    while width(&characters) + 1.0 > most && characters.len() > 2 {
+        characters.remove(characters.len() / 2);
+    }
+    characters.insert(characters.len() / 2, '\u{2026}');
+    characters.into_iter().collect()
+}
+
 /// The drawing with its clip paths counted from 0: the crate counts on through a process.
 fn renumbered(svg: &str) -> String {
     const NAME: &str = "kuva-clip-";
@@ -85,4 +129,25 @@ fn renumbered(svg: &str) -> String {
         text.push_str(&format!("{NAME}{at}{rest}"));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Titles of long names ended beyond both sides of the drawing.
+    #[test]
+    fn regression_a_long_title_left_the_drawing() {
+        let title = "W".repeat(100) + ": the array";
+        let fitted = shortened(&title, 24.0);
+        assert!(
+            fitted.starts_with("WWWW") && fitted.ends_with("the array"),
+            "{fitted}"
+        );
+        assert!(
+            fitted.contains('\u{2026}') && fitted.chars().count() < 32,
+            "{fitted}"
+        );
+        assert_eq!(shortened("seed: the array", 24.0), "seed: the array");
+    }
 }

@@ -275,6 +275,11 @@ fn converse(
                 looks = looks.saturating_sub(1);
                 continue;
             }
+            Err(RecvTimeoutError::Disconnected) if version.is_empty() => {
+                return Err(Some(format!(
+                    "Python ended before it read anything; {INSTALL}; or {ADVICE}"
+                )));
+            }
             Err(RecvTimeoutError::Disconnected) => return Err(None),
             Ok(Heard::Garbled) => return Err(Some(garbled())),
             Ok(Heard::Parts(parts)) => {
