@@ -60,6 +60,9 @@ pub enum BudgetName {
     Solution,
 }
 
+/// Beyond this an interpolation's error does not fall yet as the fourth power of its step.
+const RESOLVED: f64 = 0.1;
+
 impl BudgetName {
     /// In words.
     #[must_use]
@@ -80,8 +83,8 @@ impl BudgetName {
         }
     }
 
-    /// The remedy, as the headline prints it.
-    fn to_halve(self) -> &'static str {
+    /// The remedy for an `error`, as the headline prints it.
+    fn to_halve(self, error: f64) -> &'static str {
         match self {
             Self::Points => "take about twice as many points, 1.5 times along x and y of a grid",
             Self::Heights => "export the surface with half the chord tolerance",
@@ -89,6 +92,9 @@ impl BudgetName {
                 "take 1.4 times as many points along x and y, or let --refine add heights"
             }
             Self::Forces | Self::MapNodes => "halve --tolerance",
+            Self::Interpolation if error > RESOLVED => {
+                "take twice as many nodes along each axis of [workspace], of which so few do not resolve the field"
+            }
             Self::Interpolation => "take 1.2 times as many nodes along each axis of [workspace]",
             Self::Saturation => {
                 "set supply.current_max_a near the currents used, or lower them below the steel's knee"
@@ -419,7 +425,7 @@ impl Headline {
         let lambda = with_error(self.lambda_n_per_m, self.lambda_error_n_per_m);
         self.lambda = format!("{lambda} N/m");
         let largest = self.budget.first().filter(|part| part.error > 0.0);
-        self.to_halve = largest.map(|part| part.part.to_halve().to_owned());
+        self.to_halve = largest.map(|part| part.part.to_halve(part.error).to_owned());
     }
 
     /// Adds what the finger feels of it.

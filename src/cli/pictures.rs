@@ -42,6 +42,15 @@ pub fn checked<'a, const COUNT: usize>(
     force: bool,
     document: &DesignDocument,
 ) -> Result<[Option<Picture<'a>>; COUNT], Failure> {
+    let given = files.iter().flatten();
+    if given
+        .filter(|file| matches!(file, FileArgument::Standard))
+        .count()
+        > 1
+    {
+        let wrong = "only one drawing can go to standard output (-)";
+        return Err(Failure::Usage(wrong.to_owned()));
+    }
     check_distinct(files.iter().flatten().map(|file| file.as_given())).map_err(RunError::from)?;
     let pictures =
         files.map(|file| file.map(|file| Picture::new(file, force, document.also_read())));

@@ -134,12 +134,13 @@ pub fn share_with_error(part: f64, error: f64) -> String {
     share(part)
 }
 
-/// A share in the digits of which the last is off by five at most.
+/// A share in the digits of which the last is off by five at most; one of them in any case.
 #[must_use]
 pub fn share_within(part: f64, error: f64) -> String {
     let known = 10f64.powf((error / 5.0).log10().ceil());
     if part > 0.0 && known > last_digit(part) {
-        return share((part / known).round().max(1.0) * known);
+        let known = known.min(10f64.powf(part.log10().floor()));
+        return share((part / known).round() * known);
     }
     share(part)
 }
@@ -176,7 +177,9 @@ mod tests {
             (0.362, 0.009, "36.2 +- 0.9 %", "36 %"),
             (0.113, 0.015, "11.3 +- 1.5 %", "11 %"),
             (1.6, 0.9, "160 +- 90 %", "200 %"),
-            (0.02, 0.3, "0 +- 30 %", "10 %"),
+            (0.02, 0.3, "0 +- 30 %", "2 %"),
+            // Printed as 10 %, beside 7 % everywhere else.
+            (0.07, 0.07, "7 +- 7 %", "7 %"),
             (0.0, 0.0, "0 %", "0 %"),
         ] {
             assert_eq!(share_with_error(part, error), with);
