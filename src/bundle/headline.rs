@@ -129,6 +129,9 @@ pub enum FeltCause {
     /// The error of the currents: out of reach within their limits, or in components that were not requested.
     #[strum(serialize = "the currents themselves")]
     Currents,
+    /// Steel along a B-H curve, whose force per ampere is another one at smaller currents than the largest.
+    #[strum(serialize = "smaller currents of saturated steel")]
+    SmallerCurrents,
     /// The position.
     #[strum(serialize = "position sensor")]
     Sensor,
@@ -189,8 +192,23 @@ impl FeltShares {
     fn plus(self, more: f64) -> Self {
         Self {
             fixed: self.fixed + more,
+            ..self.plus_with_feedback(more)
+        }
+    }
+
+    fn plus_with_feedback(self, more: f64) -> Self {
+        Self {
+            fixed: self.fixed,
             feedback: self.feedback + more,
             robust: self.robust.map(|of| of + more),
+        }
+    }
+
+    /// None, of the same kinds of currents.
+    fn none(self) -> Self {
+        Self {
+            robust: self.robust.map(|_| 0.0),
+            ..Self::default()
         }
     }
 }
@@ -207,7 +225,7 @@ pub struct FeltPart {
 /// The error of the force vector from the file to the finger.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FeltForce {
-    /// All of it: `expected` plus the most that the computation may add.
+    /// All of it: `expected` plus the most that the computation and, with feedback, smaller currents may add.
     pub total: FeltShares,
     /// Root mean square over the points and the uncertainties, relative to that of the requested force.
     pub expected: FeltShares,
@@ -215,7 +233,7 @@ pub struct FeltForce {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<FeltShares>,
-    /// The same split: the computation adds up with the others, whose squares do.
+    /// The same split: computation and smaller currents add up with the others, whose squares do.
     pub parts: Vec<FeltPart>,
     /// Effects that none of the parts covers.
     pub not_modelled: Vec<String>,
@@ -238,9 +256,15 @@ const NOT_MODELLED: [&str; 6] = [
 
 impl FeltForce {
     /// Of all points without any uncertainty, or with those of `study`. `pull_share` is that of the unpowered steel's
-    /// sideways pull, where its upward one counts.
+    /// sideways pull, where its upward one counts; `smaller_currents` how far the force per ampere is another one at
+    /// currents below the static ones, which feedback has.
     #[must_use]
-    pub fn new(all: &AllPoints, study: Option<&Study>, pull_share: Option<f64>) -> Self {
+    pub fn new(
+        all: &AllPoints,
+        study: Option<&Study>,
+        pull_share: Option<f64>,
+        smaller_currents: f64,
+    ) -> Self {
         let [(fixed, fixed_off), (feedback, feedback_off)] =
             [&all.fixed, &all.feedback].map(|of| share_and_error(&of.squares));
         let of = |fixed, feedback| FeltShares {
@@ -278,14 +302,18 @@ impl FeltForce {
         let of_tilt = (pull.is_some() && causes.iter().any(|of| of.cause == Cause::Tilt))
             .then(|| TILTED_PULL.to_owned());
         let expected = study.map_or(exact, promised);
+        let of_steel = (smaller_currents > 0.0).then(|| FeltPart {
+            cause: FeltCause::SmallerCurrents,
+            error: expected.none().plus_with_feedback(smaller_currents),
+        });
         Self {
-            total: expected,
+            total: expected.plus_with_feedback(smaller_currents),
             expected,
             sampling: match study {
                 Some(study) => study.sampling.map(FeltShares::from),
                 None => Some(sampling),
             },
-            parts: std::iter::once(own).chain(parts).collect(),
+            parts: (of_steel.into_iter()).chain([own]).chain(parts).collect(),
             not_modelled: (pull.into_iter().chain(of_tilt).chain(not_given))
                 .chain(NOT_MODELLED.map(str::to_owned))
                 .collect(),
@@ -294,21 +322,16 @@ impl FeltForce {
 
     /// Counts the most that the computation may add.
     fn count(&mut self, computation: f64) {
-        self.total = self.expected.plus(computation);
         self.parts
             .retain(|part| part.cause != FeltCause::Computation);
-        let nothing = FeltShares {
-            fixed: 0.0,
-            feedback: 0.0,
-            robust: self.expected.robust.map(|_| 0.0),
+        let of_steel = (self.parts.iter()).find(|part| part.cause == FeltCause::SmallerCurrents);
+        let of_steel = of_steel.map_or(0.0, |part| part.error.feedback);
+        self.total = self.expected.plus(computation).plus_with_feedback(of_steel);
+        let part = FeltPart {
+            cause: FeltCause::Computation,
+            error: self.expected.none().plus(computation),
         };
-        self.parts.insert(
-            0,
-            FeltPart {
-                cause: FeltCause::Computation,
-                error: nothing.plus(computation),
-            },
-        );
+        self.parts.insert(0, part);
     }
 }
 

@@ -531,6 +531,17 @@ fn forces_of_a_saturated_core_hold_at_its_limit_alone() {
         stated >= off * number(&shared, "/lambda_n_per_m"),
         "{stated} {off}"
     );
+    // With feedback the currents are smaller than those that the forces per ampere are of: the headline left that out.
+    saturated(&place, "", "current_max_a = 20");
+    let felt = &lambda(&json).json()["headline"]["felt"];
+    let parts = felt["parts"].as_array().expect("parts");
+    let of_steel = parts
+        .iter()
+        .find(|part| part["cause"] == "smaller_currents");
+    let of_steel = &of_steel.expect("the part of smaller currents")["error"];
+    let [fixed, feedback] = ["static", "feedback"].map(|of| number(of_steel, &format!("/{of}")));
+    assert!(fixed == 0.0 && feedback > 0.1, "{of_steel}");
+    assert!(number(felt, "/total/feedback") > feedback, "{felt}");
 }
 
 /// Regression: the current that cores are solved at was the upper limit, whatever ran below zero, and the limit of the sum,

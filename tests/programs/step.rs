@@ -163,7 +163,7 @@ fn a_reader_that_answers_nonsense_is_refused() {
     };
     let cases = [
         ("no json".to_owned(), "no proper result"),
-        (String::new(), "ended on it"),
+        (String::new(), "ended before it read anything"),
         (result(part, body), "no proper result"),
         (
             result(part, &body.replace("\"part\":0", "\"part\":7")),

@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::passive::{self, Pull};
-use crate::scene::steel::Solved;
+use crate::scene::steel::{SMALLER_CURRENTS, Solved};
 
 use super::LambdaOptions;
 use super::feedback::render_error;
@@ -91,7 +91,11 @@ pub(crate) fn add(
     let study = study_of(&all, (scene, solved), points, (options, force), progress)?;
     let (fixed, feedback) = (all.fixed.given, all.feedback.given);
     let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
-    let felt = FeltForce::new(&all, study.as_ref(), pull_share);
+    // What the static currents' own state leaves out is part of the computation.
+    let static_state = (file.working_point.as_ref()).map_or(0.0, |of| of.deviation_from_linear);
+    let smaller_currents = (file.accuracy.get(SMALLER_CURRENTS)).map_or(0.0, |of| of.estimate);
+    let beyond = (smaller_currents - static_state).max(0.0);
+    let felt = FeltForce::new(&all, study.as_ref(), pull_share, beyond);
     if let Some(headline) = &mut file.headline {
         headline.add_felt(felt);
     }
