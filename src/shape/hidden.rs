@@ -339,16 +339,46 @@ mod tests {
                 assert!(off.abs() < 0.01, "{found:?} {upward}");
             }
         }
-        // A cavity within a body.
-        let hollow = [
-            cube(10.0, [0.0; 3], false),
-            cube(3.0, [0.0, 0.0, 3.0], true),
-        ]
-        .concat();
-        assert!((volume(&hollow) / (one * (1.0 - 0.027)) - 1.0).abs() < 1e-12);
-        let found = Hidden::of(&placed(hollow)).unwrap();
-        let share = found.of_upward.unwrap();
-        assert!((share - 0.09 / 1.09).abs() < 0.01, "{found:?}");
+        // Hollow bodies: right, inside out, beside others; with a body in the cavity; a body in another, or partly.
+        let at = |x: f64, z: f64| [x, 0.0, z];
+        let hollow = |x: f64, out: bool| {
+            let cavity = cube(3.0, at(x, 3.0), !out);
+            [cube(10.0, at(x, 0.0), out), cavity].concat()
+        };
+        let right = one * (1.0 - 0.027);
+        let other = |out: bool| cube(10.0, at(30.0, 0.0), out);
+        let within = |out: bool| cube(1.0, at(0.0, 4.0), out);
+        let poking = |out: bool| cube(3.0, at(0.0, 9.0), out);
+        for out in [false, true] {
+            for (triangles, expected) in [
+                (hollow(0.0, out), right),
+                ([hollow(0.0, out), other(false)].concat(), right + one),
+                ([hollow(0.0, out), other(true)].concat(), right + one),
+                ([hollow(0.0, out), hollow(30.0, !out)].concat(), 2.0 * right),
+                (
+                    [hollow(0.0, out), within(true)].concat(),
+                    right + 1e-3 * one,
+                ),
+                (
+                    [hollow(0.0, out), within(false)].concat(),
+                    right + 1e-3 * one,
+                ),
+                (
+                    [cube(10.0, at(0.0, 0.0), out), poking(true)].concat(),
+                    1.027 * one,
+                ),
+                (
+                    [cube(10.0, at(0.0, 0.0), out), poking(false)].concat(),
+                    1.027 * one,
+                ),
+            ] {
+                let found = volume(&triangles);
+                assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+            }
+            let found = Hidden::of(&placed(hollow(0.0, out))).unwrap();
+            let share = found.of_upward.unwrap();
+            assert!((share - 0.09 / 1.09).abs() < 0.01, "{found:?}");
+        }
     }
 
     /// Facets turned round made half of a box's upper side an undercut.
