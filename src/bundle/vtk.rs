@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::npz::{MapArrays, SIDES};
+use super::npz::{MapArrays, PASSIVE, SIDES};
 
 /// Steps of an axis may differ by this, relative to the axis' length.
 const EVEN: f64 = 1e-9;
@@ -152,6 +152,8 @@ pub(crate) fn write_map_image(out: &mut dyn Write, map: &MapArrays) -> io::Resul
             .map(|(coil, block)| Array::numbers(&format!("{name}_coil_{coil}"), components, block));
         arrays.extend(named);
     }
+    let pull = map.passive_force_n.as_deref();
+    arrays.extend(pull.map(|values| Array::numbers(PASSIVE, 1, values)));
     write_image(out, [&*map.x_m, &*map.y_m, &*map.z_m], &arrays)
 }
 

@@ -27,6 +27,9 @@ const POINT_BYTES: f64 = 320.0;
 const FORCE_BYTES: f64 = 32.0;
 /// Bytes of a component of the field of one coil at one point, with its row of a table.
 const PROBE_VALUE_BYTES: f64 = 16.0;
+/// Bytes of a replayed position, and of the current of one coil there.
+const POSITION_BYTES: f64 = 700.0;
+const CURRENT_BYTES: f64 = 24.0;
 /// Operations a second of one thread on the products of a coupled array.
 const OPERATIONS_PER_S: f64 = 2e9;
 /// The same on dense matrices.
@@ -220,6 +223,30 @@ pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
         bytes: (POINT_BYTES + FORCE_BYTES * coils as f64) * product(&samples),
         cpu_seconds: 0.0,
         reduce: "ask for fewer points (x_mm and y_mm under [points], or --grid)",
+        misses: None,
+    }
+}
+
+/// A replay of so many positions.
+#[must_use]
+pub fn of_replay(positions: usize, coils: usize) -> Cost {
+    Cost {
+        what: format!("the replay of {positions} positions and {coils} coils"),
+        bytes: (POSITION_BYTES + CURRENT_BYTES * coils as f64) * positions as f64,
+        cpu_seconds: 0.0,
+        reduce: "cut the trajectory into parts, or take a lower --rate",
+        misses: None,
+    }
+}
+
+/// A bundle's map of so many values, as it is held and computed again.
+#[must_use]
+pub fn of_map_again(values: usize) -> Cost {
+    Cost {
+        what: format!("the bundle's map of {values} values"),
+        bytes: 2.0 * MAP_VALUE_BYTES * values as f64,
+        cpu_seconds: 0.0,
+        reduce: "calibrate with fewer nodes of [workspace]",
         misses: None,
     }
 }

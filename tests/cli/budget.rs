@@ -113,3 +113,22 @@ fn a_plan_solves_no_array() {
     );
     assert!(ran.err.contains("10000 coupled cores"), "{}", ran.err);
 }
+
+/// `verify` and `replay` took what they needed whatever was granted.
+#[test]
+fn regression_commands_that_read_a_bundle_took_no_notice_of_the_grant() {
+    let place = Place::new();
+    place
+        .run(&["calibrate", SEED, "shapes/wedge.toml", "--no-report"])
+        .ends(0);
+    let bundle = "results/seed_air/wedge";
+    let granted = ["--memory", "1kB"];
+    for command in [
+        &["verify", bundle][..],
+        &["replay", bundle, "--synthesize", "scan"],
+    ] {
+        place
+            .run(&[command, &granted].concat())
+            .says(&["of memory, and --memory grants 1 kB"]);
+    }
+}

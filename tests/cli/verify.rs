@@ -1,5 +1,7 @@
 //! `verify` of fresh bundles: what calibrate wrote follows from its inputs, whatever was requested.
 
+use fluxform::bundle::artefact::sha256_hex;
+use fluxform_testing::bundle::edit_manifest;
 use fluxform_testing::place::Place;
 
 /// The parts of a design that the cases change.
@@ -344,4 +346,32 @@ fn fresh_bundles_verify_whatever_was_requested() {
             assert_eq!(report["unchecked"].as_array().unwrap().len(), 0, "{name}");
         }
     }
+}
+
+/// A fault in the design that a bundle keeps was reported in the user's file of that name, which has none, as a bad input.
+#[test]
+#[allow(clippy::disallowed_methods)] // a test's own file
+fn regression_a_fault_in_the_kept_design_was_in_the_users_file() {
+    let place = Place::new();
+    place
+        .run(&["calibrate", SEED, "shapes/flat.toml", "--no-report"])
+        .ends(0);
+    let bundle = place.path("results/seed_air/flat");
+    let text = place.text("results/seed_air/flat/design.toml");
+    let changed = text.replace("length_mm = 100.0", "length_mm = -100.0");
+    assert_ne!(text, changed);
+    std::fs::write(bundle.join("design.toml"), &changed).unwrap();
+    edit_manifest(&bundle, |manifest| {
+        let files = manifest["files"].as_array_mut().unwrap();
+        let entry = files.iter_mut().find(|file| file["path"] == "design.toml");
+        let entry = entry.unwrap();
+        entry["bytes"] = changed.len().into();
+        entry["sha256"] = sha256_hex(changed.as_bytes()).into();
+    });
+    let ran = place.run(&["verify", "results/seed_air/flat"]).ends(5);
+    assert!(
+        ran.err.contains("results/seed_air/flat/design.toml: as"),
+        "{}",
+        ran.err
+    );
 }

@@ -85,17 +85,20 @@ fn nearest(nodes: &[f64], place: f64) -> f64 {
     found.copied().unwrap_or(place)
 }
 
-/// The force of these currents at every place, N; along x and y zero where the map does not hold them.
+/// The force of these currents and of the unpowered steel, as far as the map counts it, at every place, N; along x and y
+/// zero where the map does not hold them.
 fn forces_n(map: &ForceMap, places_m: &[[f64; 3]], currents_a: &[f64]) -> Vec<[f64; 3]> {
     let mut vectors = vec![[0.0; 3]; map.coils()];
     let mut upward = vec![0.0; map.coils()];
     let force = |place: &[f64; 3]| {
-        if map.vectors_at(*place, &mut vectors).is_none() && map.at(*place, &mut upward).is_some() {
+        let pull_n = map.vectors_at(*place, &mut vectors).or_else(|| {
+            let pull_n = map.at(*place, &mut upward)?;
             for (vector, upward) in vectors.iter_mut().zip(&upward) {
                 vector[2] = *upward;
             }
-        }
-        let mut sum = [0.0; 3];
+            Some(pull_n)
+        });
+        let mut sum = [0.0, 0.0, pull_n.unwrap_or(0.0)];
         for (vector, current) in vectors.iter().zip(currents_a) {
             for (sum, part) in sum.iter_mut().zip(vector) {
                 *sum += current * part;

@@ -17,6 +17,7 @@ use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{FileSet, Overwrite, check_distinct};
 use crate::bundle::trajectory::Trajectory;
 use crate::cli::args::Writing;
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{self, Codes};
@@ -24,6 +25,7 @@ use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
+use crate::scene::cost::of_replay;
 
 /// More positions than this are refused.
 const MOST_POSITIONS: f64 = 1e8;
@@ -149,6 +151,13 @@ impl Replay {
             opened
         };
         let (trajectory, source) = self.trajectory(&opened)?;
+        let coils = opened.bundle.map.runtime.resistance_ohm.len();
+        let cost = of_replay(trajectory.len(), coils);
+        let origin = match &self.trajectory {
+            Some(_) => CostOrigin::Document,
+            None => CostOrigin::Flag,
+        };
+        allow([cost], origin, printer)?;
         let inputs: Vec<_> = std::iter::once(opened.input.clone())
             .chain(source.input.clone())
             .collect();

@@ -60,8 +60,11 @@ impl Sources {
         let (mut faults, mut notes) = (Vec::new(), Vec::new());
         let design = kept_text(bundle, DESIGN_FILE)?;
         let given = inputs.first().map_or(STANDARD, |input| &input.path);
-        let (mut parsed, _) = Design::from_toml(&design, Path::new(given), Need::CALIBRATE)
-            .map_err(|invalid| RunError::Input(invalid.to_string()))?;
+        let read = Design::from_toml(&design, Path::new(given), Need::CALIBRATE);
+        let (mut parsed, _) = read.map_err(|invalid| {
+            let message = format!("as {given}: {}", invalid.to_string().trim());
+            content(bundle, DESIGN_FILE, message)
+        })?;
         let mut kept = vec![(DESIGN_FILE.to_owned(), digest(design.as_bytes()))];
         let named = parsed.named_files().into_iter();
         let copies: Vec<String> = named.map(|file| file.kept_name()).collect();
@@ -227,12 +230,12 @@ fn kept_text(bundle: &Bundle, name: &str) -> Result<String, RunError> {
 }
 
 fn changed(bundle: &Bundle, name: &str) -> RunError {
-    let (path, message) = (bundle.folder.join(name), "changed while it was read");
-    BundleError::Content {
-        path,
-        message: message.to_owned(),
-    }
-    .into()
+    content(bundle, name, "changed while it was read".to_owned())
+}
+
+fn content(bundle: &Bundle, name: &str, message: String) -> RunError {
+    let path = bundle.folder.join(name);
+    BundleError::Content { path, message }.into()
 }
 
 /// The digest of a file that the bundle keeps, as it is listed.

@@ -191,6 +191,9 @@ impl<'a> Verifier<'a> {
             // With the bundle, and by the independent route.
             let again = || cost::of_force_constants(design, &shape.document, tolerance);
             costs.extend(again().into_iter().chain(again()));
+            let coils = design.array.positions_m.len();
+            costs.push(cost::of_points(&shape.document, coils));
+            costs.push(cost::of_map_again(bundle.map.gz_t_per_m_per_a.len()));
             // Of its nodes the bundle holds those that the object needs.
             costs.push(Cost {
                 bytes: 0.0,
@@ -278,7 +281,7 @@ impl<'a> Verifier<'a> {
         let Some(shape) = &sources.shape else {
             all.unchecked.push(format!(
                 "points, requested directions, lambda's path and what follows from lambda, the setting for \
-                 uncertainties, tensors and fields of the map, pages, plots, texts and stated errors: {}",
+                 uncertainties, tensors and fields of the map, pages, plots, files for ParaView, texts and stated errors: {}",
                 sources.without_shape()
             ));
             return Ok(None);

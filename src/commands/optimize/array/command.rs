@@ -274,6 +274,15 @@ impl ArrayFlags {
         for warning in ended.iter().flat_map(|result| &result.warnings) {
             printer.warning(warning);
         }
+        let is_kept = |result: &ArrayOptimization| result.status == ArrayEnding::Interrupted;
+        if let (Some(FileArgument::Path(path)), true, false) =
+            (shared.out, ended.as_ref().is_ok_and(is_kept), shared.force)
+        {
+            printer.warning(&format!(
+                "{} holds the best array so far; the same command with --force replaces it",
+                shown_path(path)
+            ));
+        }
         let mut kept = Ok(Stream::Output);
         let given = give(
             |outlet| {
