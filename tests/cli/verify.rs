@@ -1,5 +1,6 @@
 //! `verify` of fresh bundles: what calibrate wrote follows from its inputs, whatever was requested.
 
+use crate::SEED;
 use fluxform::bundle::artefact::sha256_hex;
 use fluxform_testing::bundle::edit_manifest;
 use fluxform_testing::place::Place;
