@@ -9,6 +9,7 @@ use fluxform::lambda::two_fingers::between_magnets_n;
 use fluxform::progress::Silent;
 use fluxform::scene::moment_a_m2;
 use fluxform_testing::Random;
+use fluxform_testing::place::Place;
 
 use crate::support::{both_ways, both_ways_along_the_normal};
 
@@ -230,5 +231,45 @@ fn magnets_that_overlap_are_refused_with_their_time() {
         message
             .contains("at 0.01 s the two fingers are 1.414 mm apart across their magnets' axis and 1 mm along it"),
         "{message}"
+    );
+}
+
+/// Beside the push of dipoles that of whole cylinders, 31 mN away, was in no error.
+#[test]
+fn regression_whole_magnets_pushed_each_other_as_dipoles_without_a_word() {
+    let place = Place::new();
+    let design = place
+        .text("designs/seed_air.toml")
+        .replace("model = \"dipole\"", "model = \"cylinder\"");
+    place.write("whole.toml", &design);
+    let args = [
+        "calibrate",
+        "whole.toml",
+        "shapes/flat.toml",
+        "--out",
+        "b",
+        "--no-report",
+    ];
+    place.run(&args).ends(0);
+    place.write(
+        "pair.csv",
+        "t_s,x_m,y_m,z_m,x2_m,y2_m,z2_m\n0,0,0,0.045,0.02,0,0.055\n",
+    );
+    let args = [
+        "replay",
+        "b/seed_air/flat",
+        "pair.csv",
+        "--out",
+        "r.csv",
+        "--format",
+        "json",
+    ];
+    let report = place.run(&args).ends(0).json();
+    let stated = report["accuracy"]["force"]["estimate"].as_f64().unwrap();
+    assert!((0.03099..0.033).contains(&stated), "{stated}");
+    let warnings = report["warnings"].to_string();
+    assert!(
+        warnings.contains("as whole cylinders by up to"),
+        "{warnings}"
     );
 }

@@ -4,7 +4,8 @@ use crate::RunError;
 use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
-use crate::numerics::vec3::dot;
+use crate::lambda::two_fingers::FingerMagnet;
+use crate::numerics::vec3::{dot, minus};
 use crate::progress::Progress;
 
 use super::felt::Felt;
@@ -78,6 +79,8 @@ pub(super) struct Follower {
     pub(super) felt: Option<Felt>,
     /// The largest force of one finger's magnet on the other's, N.
     pub(super) pushed_n: f64,
+    /// The magnets of two fingers where they are whole cylinders, which push each other as dipoles here.
+    pub(super) cylinders: Option<FingerMagnet>,
 }
 
 /// A position with its step.
@@ -105,6 +108,7 @@ impl Follower {
             bandwidth_hz,
             felt: opened.felt(positions),
             pushed_n: 0.0,
+            cylinders: None,
         }
     }
 
@@ -164,8 +168,15 @@ impl Follower {
                 let (step, position) = (&steps.first, trajectory.position_m[row]);
                 let certificate = self.renderer.certificate(step, command);
                 self.bounds.certificate = self.bounds.certificate.max(certificate);
+                let push = self.cylinders.filter(|_| steps.pushed_n > 0.0);
+                let off_n = push
+                    .zip(trajectory.second_m.get(row))
+                    .map_or([0.0; 3], |(magnet, second)| {
+                        magnet.off_dipoles_n(minus(*second, position))
+                    });
                 for finger in trajectory.fingers() {
-                    self.bounds.add(self.renderer.map(), finger[row], &flowing);
+                    self.bounds
+                        .add(self.renderer.map(), finger[row], &flowing, off_n);
                 }
                 if let Some(felt) = &mut self.felt {
                     felt.add(&self.renderer, position, step, command);

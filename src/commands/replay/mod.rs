@@ -24,12 +24,13 @@ use crate::bundle::replay::ReplayRows;
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::commands::calibrate::DESIGN_FILE;
-use crate::design::{Design, Driver, Need};
+use crate::design::{Design, Driver, MagnetModel, Need};
 use crate::lambda::two_fingers::FingerMagnet;
 use crate::progress::Progress;
 use crate::scene::finger_magnet;
 use crate::scene::steel::SMALLER_CURRENTS;
 use crate::scene::working_point::SUPERPOSITION_WARNING;
+use crate::units::FORCE_JND;
 use felt::Felt;
 use follow::{Follower, Steps};
 use page::Below;
@@ -103,7 +104,7 @@ impl Opened {
     /// # Errors
     /// A bundle without a copy of its design, which has the magnets; one whose currents are chosen for
     /// uncertainties.
-    fn for_two_fingers(&self) -> Result<(Renderer, FingerMagnet), RunError> {
+    fn for_two_fingers(&self) -> Result<(Renderer, FingerMagnet, MagnetModel), RunError> {
         let name = self.bundle.folder.display();
         if self.renderer.setting().is_some() {
             return Err(RunError::Input(
@@ -117,7 +118,7 @@ impl Opened {
         let magnet = finger_magnet(&design);
         let renderer = Renderer::two_fingers(&self.bundle, magnet.moment_a_m2)
             .map_err(|error| RunError::Input(format!("{name}: {error}")))?;
-        Ok((renderer, magnet))
+        Ok((renderer, magnet, design.magnet.model))
     }
 
     /// The bundle's files, its seconds, which no manifest lists, among them.
@@ -239,12 +240,14 @@ pub fn run(
             source.source
         )));
     }
+    let mut cylinders = None;
     if two {
-        let (for_two, magnet) = opened.for_two_fingers()?;
+        let (for_two, magnet, model) = opened.for_two_fingers()?;
         if let Some(touching) = plausible::touching(trajectory, &magnet) {
             return Err(RunError::Input(format!("{}: {touching}", source.source)));
         }
         renderer = for_two;
+        cylinders = (model == MagnetModel::Cylinder).then_some(magnet);
     }
     let mut drive = dynamics.then(|| opened.drive()).transpose()?;
     let bandwidth_hz = opened.bandwidth_hz();
@@ -276,6 +279,7 @@ pub fn run(
         .as_ref()
         .map(|drive| DynamicsSummary::of(drive, &opened.bundle, bandwidth_hz));
     let mut follower = Follower::new(opened, renderer, bandwidth_hz, trajectory.len());
+    follower.cylinders = cylinders;
     let followed = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
     let pushed_n = follower.pushed_n;
     let felt = follower.felt.as_ref().and_then(Felt::summary);
@@ -288,7 +292,16 @@ pub fn run(
         warnings,
     );
     summary.force.felt = felt;
-    summary.warnings.extend(summary.of_unknown_forces());
+    let off_n = follower.bounds.off_dipoles_n;
+    let of_cylinders = (off_n > FORCE_JND * summary.force.wanted_max_n).then(|| {
+        format!(
+            "the fingers' magnets push each other as dipoles here: as whole cylinders by up to {:.2} mN otherwise, which the \
+             stated error of the forces allows for",
+            1e3 * off_n
+        )
+    });
+    summary.warnings.extend(of_cylinders);
+    summary.warnings.extend(summary.of_unknown_forces(off_n));
     if let Some(two) = &mut summary.two_fingers {
         two.magnets_force_n = pushed_n;
     }

@@ -296,6 +296,8 @@ pub(super) struct Bounds {
     passive_n: f64,
     /// The largest of the force, N.
     force_n: f64,
+    /// The largest difference of two fingers' magnets from dipoles in what they push each other by, N.
+    pub(super) off_dipoles_n: f64,
     /// The largest of the allocation's certificates.
     pub(super) certificate: f64,
 }
@@ -318,12 +320,20 @@ impl Bounds {
             most_a: limits_a.fold(0.0, |most, limit| most.max(limit.abs())),
             passive_n: passive.map_or(0.0, |p| p.interpolation.largest_error * p.largest_n.abs()),
             force_n: 0.0,
+            off_dipoles_n: 0.0,
             certificate: 0.0,
         }
     }
 
     /// A position of a finger with the currents that flow.
-    pub(super) fn add(&mut self, map: &ForceMap, position_m: [f64; 3], currents_a: &[f64]) {
+    /// `off_dipoles_n` is how far the other finger's push is from that of dipoles.
+    pub(super) fn add(
+        &mut self,
+        map: &ForceMap,
+        position_m: [f64; 3],
+        currents_a: &[f64],
+        off_dipoles_n: [f64; 3],
+    ) {
         let Some(local_n) = map.interpolation_error_n(position_m, currents_a) else {
             return;
         };
@@ -347,7 +357,13 @@ impl Bounds {
                 stated_n
             }
         });
-        self.force_n = self.force_n.max(at_nodes_n + x.hypot(y).hypot(up));
+        let off_dipoles_n = match (map.has_vectors(), off_dipoles_n) {
+            (true, [x, y, up]) => x.hypot(y).hypot(up),
+            (false, [_, _, up]) => up.abs(),
+        };
+        let off_n = at_nodes_n + x.hypot(y).hypot(up) + off_dipoles_n;
+        self.force_n = self.force_n.max(off_n);
+        self.off_dipoles_n = self.off_dipoles_n.max(off_dipoles_n);
     }
 
     /// Currents chosen for uncertainties or for two fingers (`other`) are not those of eq. 8, whose conditions are
@@ -372,7 +388,8 @@ impl Bounds {
                     "the map's stated errors at its nodes, and what it leaves of the cores' B-H curve, times the largest \
                      force per ampere at the height and the sum of the currents' sizes; and between the nodes how far \
                      interpolation through others beside them is off at the position, or the map's largest stated \
-                     error where that is smaller, or half of the force and more",
+                     error where that is smaller, or half of the force and more; and for magnets that are whole cylinders \
+                     how far the push of two fingers is from that of dipoles",
                 ),
             ),
             (
@@ -459,10 +476,10 @@ impl ReplaySummary {
         self.accuracy[FORCE].estimate
     }
 
-    /// A sentence where a finger notices the forces' error.
-    pub(super) fn of_unknown_forces(&self) -> Option<String> {
+    /// A sentence where a finger notices the forces' error but for `stated_n` of it.
+    pub(super) fn of_unknown_forces(&self, stated_n: f64) -> Option<String> {
         let (error_n, wanted_n) = (self.force_error_n(), self.force.wanted_max_n);
-        (error_n > FORCE_JND * wanted_n && wanted_n > 0.0).then(|| {
+        (error_n - stated_n > FORCE_JND * wanted_n && wanted_n > 0.0).then(|| {
             format!(
                 "the forces are known to {:.2} mN only, {:.0} % of the largest one requested: the errors stated here leave that \
                  out; take more nodes in [workspace] or a smaller --tolerance and calibrate again",
