@@ -65,7 +65,8 @@ pub fn stencil(nodes: &[f64], position: f64) -> Option<Stencil> {
 
 /// Stencils through other nodes around the place of [`stencil`], and how far their values are from its: where the grid
 /// resolves a function two to four times its error there. Of more than four nodes they are moved by one to either side
-/// as far as there are nodes; fewer are short of either end's, which differ by more. Of one node there are none.
+/// as far as there are nodes; fewer are short of either end's, which differ by more. At a node, which is exact, and of
+/// one node there are none.
 ///
 /// The products of the distances to two such sets of four differ by `4 / (1 + t)` or `4 / (2 - t)` times the central
 /// one's, at the part `t` of a cell, and by `4 / t` or more in the border cells.
@@ -74,6 +75,9 @@ pub fn beside(nodes: &[f64], position: f64) -> Vec<Stencil> {
     let Some(Stencil { start, count, .. }) = stencil(nodes, position) else {
         return Vec::new();
     };
+    if nodes[around(nodes, position)].contains(&position) {
+        return Vec::new();
+    }
     let end = start + count;
     let ranges = match nodes.len() {
         0 | 1 => Vec::new(),

@@ -232,22 +232,8 @@ fn array(
         ));
     }
     let most_t = peak_t.iter().copied().fold(0.0, f64::max);
-    if working_point.is_some() && most_t > knee_t {
-        warnings.push(format!(
-            "{CORES_AT_RATED} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
-             proportion to the currents"
-        ));
-    }
-    let limit_t = scene
-        .design
-        .limits
-        .core_field_max_t
-        .filter(|limit_t| most_t > *limit_t);
-    if let Some(limit_t) = limit_t {
-        warnings.push(format!(
-            "{CORES_AT_RATED} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
-        ));
-    }
+    warnings.extend(above_curve_s_knee(working_point.is_some(), most_t, knee_t));
+    warnings.extend(above_limit(scene, most_t));
     let iron = match solved.iron_peaks(scene, &rated_a)? {
         Some(peaks) => {
             peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
@@ -285,6 +271,26 @@ fn coils(scene: &Scene, matrix_h: &[Vec<f64>], fields_t: [&[f64]; 2]) -> Vec<Arr
         }
     })
     .collect()
+}
+
+/// A sentence where cores along a B-H curve pass its knee.
+fn above_curve_s_knee(along_curve: bool, most_t: f64, knee_t: f64) -> Option<String> {
+    (along_curve && most_t > knee_t).then(|| {
+        format!(
+            "{CORES_AT_RATED} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
+             proportion to the currents"
+        )
+    })
+}
+
+/// A sentence where neighbours take a core over the limit, which is of one coil.
+fn above_limit(scene: &Scene, most_t: f64) -> Option<String> {
+    let limit_t = scene.design.limits.core_field_max_t?;
+    (most_t > limit_t).then(|| {
+        format!(
+            "{CORES_AT_RATED} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
+        )
+    })
 }
 
 /// How sure the flux densities in the array's cores are: the largest ones and the means.

@@ -1,6 +1,6 @@
 //! Cubic interpolation: exact on cubics and at nodes, of fourth order.
 
-use fluxform_numerics::lagrange::{locate, stencil};
+use fluxform_numerics::lagrange::{Stencil, beside, locate, stencil};
 
 fn cubic(x: f64) -> f64 {
     0.7 - 1.3 * x + 2.1 * x * x - 0.9 * x * x * x
@@ -98,4 +98,33 @@ fn components_are_picked_out_of_the_last_axis() {
     let second: Vec<f64> = values.chunks(2).map(|pair| pair[1]).collect();
     let cell = locate(axes, [0.7, 0.3, 0.5]).unwrap();
     assert_eq!(cell.component(&values, 2, 1), cell.value(&second));
+}
+
+/// Where the nodes resolve a function, stencils beside the central one are off by two to four times its error, in border
+/// cells by more; at a node there is none.
+#[test]
+fn stencils_beside_show_the_error() {
+    let nodes: Vec<f64> = (0..12).map(|k| 0.1 * f64::from(k)).collect();
+    let function = |x: f64| (1.3 * x).exp();
+    let value = |stencil: &Stencil| -> f64 {
+        let near = &nodes[stencil.start..stencil.start + stencil.count];
+        let terms = near.iter().zip(&stencil.weights);
+        terms.map(|(node, weight)| weight * function(*node)).sum()
+    };
+    for k in 0..110 {
+        let at = 0.01 * f64::from(k) + 0.005;
+        let central = value(&stencil(&nodes, at).unwrap());
+        let error = (central - function(at)).abs();
+        let farthest = beside(&nodes, at)
+            .iter()
+            .map(|other| (value(other) - central).abs())
+            .fold(0.0, f64::max);
+        let border = !(0.1..1.0).contains(&at);
+        let ratio = farthest / error;
+        assert!(ratio > 1.9 && (border || ratio < 4.3), "{at}: {ratio}");
+    }
+    assert!(beside(&nodes, nodes[4]).is_empty());
+    for few in [2, 3, 4] {
+        assert_eq!(beside(&nodes[..few], 0.05).len(), 2);
+    }
 }

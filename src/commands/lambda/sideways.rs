@@ -32,6 +32,14 @@ const MOST_FOLLOWED: usize = 1000;
 /// and those at which the steel's sideways pull is computed, half a millisecond each.
 const MOST_PULLED: usize = 100;
 
+/// How far forces per ampere are others at smaller currents, beyond what the static currents' own state leaves out, which is
+/// part of the computation.
+fn beyond_static(file: &LambdaFile) -> f64 {
+    let static_state = (file.working_point.as_ref()).map_or(0.0, |of| of.deviation_from_linear);
+    let smaller_currents = (file.accuracy.get(SMALLER_CURRENTS)).map_or(0.0, |of| of.estimate);
+    (smaller_currents - static_state).max(0.0)
+}
+
 /// Adds the study of what is uncertain, the sideways force of `file`'s currents and of feedback to it, if it has currents.
 ///
 /// # Errors
@@ -91,11 +99,7 @@ pub(crate) fn add(
     let study = study_of(&all, (scene, solved), points, (options, force), progress)?;
     let (fixed, feedback) = (all.fixed.given, all.feedback.given);
     let pull_share = pull.map(|pull| sideways_share(&pull, positions_m, &given, lambda));
-    // What the static currents' own state leaves out is part of the computation.
-    let static_state = (file.working_point.as_ref()).map_or(0.0, |of| of.deviation_from_linear);
-    let smaller_currents = (file.accuracy.get(SMALLER_CURRENTS)).map_or(0.0, |of| of.estimate);
-    let beyond = (smaller_currents - static_state).max(0.0);
-    let felt = FeltForce::new(&all, study.as_ref(), pull_share, beyond);
+    let felt = FeltForce::new(&all, study.as_ref(), pull_share, beyond_static(file));
     if let Some(headline) = &mut file.headline {
         headline.add_felt(felt);
     }

@@ -2,6 +2,7 @@
 
 use super::mag_manip::{MultipolesSummary, VectorFieldSummary};
 use super::{CompactSteel, MapReport};
+use crate::bundle::manifest::MapSummary;
 use crate::cli::describe;
 use crate::cli::layout::Sheet;
 use crate::cli::quantity::{bytes, count, error, mm, percent};
@@ -67,18 +68,7 @@ pub(super) fn summary(design: &Design, report: &MapReport) -> String {
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
-    let pull = map.passive_force.as_ref().map_or_else(String::new, |pull| {
-        let off = error(pull.interpolation.largest_error);
-        format!("\nand {off} of the unpowered steel's largest pull there")
-    });
-    sheet.line(
-        "between",
-        &format!(
-            "nodes {} of the largest |dBz/dz| at that height, with {}{pull}",
-            error(map.interpolation.largest_error),
-            map.interpolation.name
-        ),
-    );
+    sheet.line("between", &between_nodes(map));
     let files = report.sidecar.files.iter();
     let files: Vec<String> = files
         .map(|file| format!("{} ({})", file.path, bytes(file.bytes)))
@@ -89,6 +79,18 @@ pub(super) fn summary(design: &Design, report: &MapReport) -> String {
         &format!("{}: {}", report.folder.display(), files.join(", ")),
     );
     sheet.finish()
+}
+
+fn between_nodes(map: &MapSummary) -> String {
+    let pull = map.passive_force.as_ref().map_or_else(String::new, |pull| {
+        let off = error(pull.interpolation.largest_error);
+        format!("\nand {off} of the unpowered steel's largest pull there")
+    });
+    format!(
+        "nodes {} of the largest |dBz/dz| at that height, with {}{pull}",
+        error(map.interpolation.largest_error),
+        map.interpolation.name
+    )
 }
 
 fn compact_steel(table: &CompactSteel) -> String {

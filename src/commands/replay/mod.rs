@@ -30,7 +30,6 @@ use crate::progress::Progress;
 use crate::scene::finger_magnet;
 use crate::scene::steel::SMALLER_CURRENTS;
 use crate::scene::working_point::SUPERPOSITION_WARNING;
-use crate::units::FORCE_JND;
 use felt::Felt;
 use follow::{Follower, Steps};
 use page::Below;
@@ -292,16 +291,7 @@ pub fn run(
         warnings,
     );
     summary.force.felt = felt;
-    let off_n = follower.bounds.off_dipoles_n;
-    let of_cylinders = (off_n > FORCE_JND * summary.force.wanted_max_n).then(|| {
-        format!(
-            "the fingers' magnets push each other as dipoles here: as whole cylinders by up to {:.2} mN otherwise, which the \
-             stated error of the forces allows for",
-            1e3 * off_n
-        )
-    });
-    summary.warnings.extend(of_cylinders);
-    summary.warnings.extend(summary.of_unknown_forces(off_n));
+    summary.warn_of_forces(follower.bounds.off_dipoles_n);
     if let Some(two) = &mut summary.two_fingers {
         two.magnets_force_n = pushed_n;
     }

@@ -476,17 +476,28 @@ impl ReplaySummary {
         self.accuracy[FORCE].estimate
     }
 
-    /// A sentence where a finger notices the forces' error but for `stated_n` of it.
-    pub(super) fn of_unknown_forces(&self, stated_n: f64) -> Option<String> {
-        let (error_n, wanted_n) = (self.force_error_n(), self.force.wanted_max_n);
-        (error_n - stated_n > FORCE_JND * wanted_n && wanted_n > 0.0).then(|| {
+    /// Warns where a finger notices the forces' error, of which `off_dipoles_n` is what cylinders push each other
+    /// otherwise than dipoles.
+    pub(super) fn warn_of_forces(&mut self, off_dipoles_n: f64) {
+        let wanted_n = self.force.wanted_max_n;
+        let noticed = |error_n: f64| wanted_n > 0.0 && error_n > FORCE_JND * wanted_n;
+        let of_cylinders = noticed(off_dipoles_n).then(|| {
+            format!(
+                "the fingers' magnets push each other as dipoles here: as whole cylinders by up to {:.2} mN otherwise, \
+                 which the stated error of the forces allows for",
+                1e3 * off_dipoles_n
+            )
+        });
+        let error_n = self.force_error_n();
+        let of_map = noticed(error_n - off_dipoles_n).then(|| {
             format!(
                 "the forces are known to {:.2} mN only, {:.0} % of the largest one requested: the errors stated here leave that \
                  out; take more nodes in [workspace] or a smaller --tolerance and calibrate again",
                 1e3 * error_n,
                 100.0 * error_n / wanted_n
             )
-        })
+        });
+        self.warnings.extend(of_cylinders.into_iter().chain(of_map));
     }
 }
 
