@@ -63,10 +63,9 @@ pub fn stencil(nodes: &[f64], position: f64) -> Option<Stencil> {
     Some(through(nodes, start..start + count, position))
 }
 
-/// Stencils through other nodes around the place of [`stencil`], and how far their values are from its: where the grid
-/// resolves a function two to four times its error there. Of more than four nodes they are moved by one to either side
-/// as far as there are nodes; fewer are short of either end's, which differ by more. At a node, which is exact, and of
-/// one node there are none.
+/// Stencils through nodes beside those of [`stencil`]. Where the grid resolves a function their values differ from its by
+/// two to four times its error. Of more than four nodes they are moved by one to either side as far as there are nodes;
+/// of fewer they are short of one end, and differ by more. At a node, which is exact, and of one node there are none.
 ///
 /// The products of the distances to two such sets of four differ by `4 / (1 + t)` or `4 / (2 - t)` times the central
 /// one's, at the part `t` of a cell, and by `4 / t` or more in the border cells.

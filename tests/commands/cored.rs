@@ -291,8 +291,12 @@ fn verify_states_all_that_it_takes_before_it_solves() {
         assert_eq!(of(stage), 2, "{stage}: {stated:?}");
     }
     assert_eq!(of("the map"), 1);
+    // What takes memory alone.
+    assert_eq!((of("points of"), of("the bundle's map")), (1, 1));
     assert!(
-        stated.iter().all(|cost| cost.cpu_seconds > 0.0),
+        stated
+            .iter()
+            .all(|cost| cost.cpu_seconds > 0.0 || cost.bytes > 0.0),
         "{stated:?}"
     );
 }

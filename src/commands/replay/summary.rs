@@ -15,6 +15,7 @@ use crate::bundle::replay::{Answer, FingerRows, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::circuit::farthest_from_zero;
 use crate::coil::drive::Drive;
+use crate::commands::map::PASSIVE_STAGE;
 use crate::force_direction::ForceDirection;
 use crate::scene::steel::{LINEAR_CORES, SMALLER_CURRENTS};
 use crate::units::FORCE_JND;
@@ -292,8 +293,12 @@ pub(super) struct Bounds {
     smaller_currents: f64,
     /// The currents that the forces per ampere hold at, at most, A.
     most_a: f64,
-    /// Of the unpowered steel's pull between the nodes, N.
-    passive_n: f64,
+    /// Of the unpowered steel's pull at the nodes, N.
+    passive_at_nodes_n: f64,
+    /// The largest between them, relative to `passive_largest_n`.
+    passive_between: f64,
+    /// The largest pull on the lowest plane of nodes, N.
+    passive_largest_n: f64,
     /// The largest of the force, N.
     force_n: f64,
     /// The largest difference of two fingers' magnets from dipoles in what they push each other by, N.
@@ -318,15 +323,17 @@ impl Bounds {
             },
             smaller_currents: stage(SMALLER_CURRENTS),
             most_a: limits_a.fold(0.0, |most, limit| most.max(limit.abs())),
-            passive_n: passive.map_or(0.0, |p| p.interpolation.largest_error * p.largest_n.abs()),
+            passive_at_nodes_n: stage(PASSIVE_STAGE) * passive.map_or(0.0, |p| p.largest_n),
+            passive_between: passive.map_or(0.0, |p| p.interpolation.largest_error),
+            passive_largest_n: passive.map_or(0.0, |p| p.largest_n),
             force_n: 0.0,
             off_dipoles_n: 0.0,
             certificate: 0.0,
         }
     }
 
-    /// A position of a finger with the currents that flow.
-    /// `off_dipoles_n` is how far the other finger's push is from that of dipoles.
+    /// A position of a finger with the currents that flow; `off_dipoles_n` is how far the other finger's push is from that
+    /// of dipoles.
     pub(super) fn add(
         &mut self,
         map: &ForceMap,
@@ -344,14 +351,14 @@ impl Bounds {
             let left_a = (self.most_a - size_a).max(0.0);
             self.relative * size_a + (self.smaller_currents * size_a).min(left_a)
         });
-        let at_nodes_n = largest_n_per_a[2] * off_a.sum::<f64>();
+        let at_nodes_n = largest_n_per_a[2] * off_a.sum::<f64>() + self.passive_at_nodes_n;
         // The manifest's figure is the largest of the whole map, and adds up over the coils.
         let sum_a: f64 = sizes_a().sum();
-        let stated_n = |axis: usize| self.between[axis] * largest_n_per_a[axis] * sum_a;
         let [x, y, up] = [0, 1, 2].map(|axis| {
-            let passive_n = if axis == 2 { self.passive_n } else { 0.0 };
-            let stated_n = stated_n(axis) + passive_n;
-            if self.between[axis] < RESOLVED {
+            let passive = if axis == 2 { self.passive_between } else { 0.0 };
+            let stated_n = self.between[axis] * largest_n_per_a[axis] * sum_a
+                + passive * self.passive_largest_n;
+            if self.between[axis].max(passive) < RESOLVED {
                 local_n[axis].min(stated_n)
             } else {
                 stated_n
