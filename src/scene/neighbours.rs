@@ -207,6 +207,7 @@ fn array(
             accuracy.extend(core_field_stages(point.core_field_errors));
             peak_t.clone_from(&point.peak_field_t);
             mean_t.clone_from(&point.mean_field_t);
+            warnings.extend(above_curve_s_knee(&peak_t, knee_t));
             Some(working_point_summary(scene, &solved, &point, &air)?)
         }
         None => None,
@@ -231,9 +232,6 @@ fn array(
             FOR_CORES,
         ));
     }
-    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
-    warnings.extend(above_curve_s_knee(working_point.is_some(), most_t, knee_t));
-    warnings.extend(above_limit(scene, most_t));
     let iron = match solved.iron_peaks(scene, &rated_a)? {
         Some(peaks) => {
             peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
@@ -241,6 +239,8 @@ fn array(
         }
         None => None,
     };
+    // Among a plate and other bodies too.
+    warnings.extend(above_limit(scene, &peak_t));
     Ok(Some(ArraySummary {
         coils: coils(scene, &matrix, [&peak_t, &mean_t]),
         mutual_inductance_h: matrix,
@@ -274,8 +274,9 @@ fn coils(scene: &Scene, matrix_h: &[Vec<f64>], fields_t: [&[f64]; 2]) -> Vec<Arr
 }
 
 /// A sentence where cores along a B-H curve pass its knee.
-fn above_curve_s_knee(along_curve: bool, most_t: f64, knee_t: f64) -> Option<String> {
-    (along_curve && most_t > knee_t).then(|| {
+fn above_curve_s_knee(peak_t: &[f64], knee_t: f64) -> Option<String> {
+    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
+    (most_t > knee_t).then(|| {
         format!(
             "{CORES_AT_RATED} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
              proportion to the currents"
@@ -284,8 +285,9 @@ fn above_curve_s_knee(along_curve: bool, most_t: f64, knee_t: f64) -> Option<Str
 }
 
 /// A sentence where neighbours take a core over the limit, which is of one coil.
-fn above_limit(scene: &Scene, most_t: f64) -> Option<String> {
+fn above_limit(scene: &Scene, peak_t: &[f64]) -> Option<String> {
     let limit_t = scene.design.limits.core_field_max_t?;
+    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
     (most_t > limit_t).then(|| {
         format!(
             "{CORES_AT_RATED} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
@@ -295,12 +297,13 @@ fn above_limit(scene: &Scene, most_t: f64) -> Option<String> {
 
 /// How sure the flux densities in the array's cores are: the largest ones and the means.
 fn core_field_stages([peak, mean]: [f64; 2]) -> [(&'static str, StageAccuracy); 2] {
-    let stage = |estimate, relative_to: &str| {
-        StageAccuracy {
+    let stage = |estimate, relative_to: &str| StageAccuracy {
         estimate,
         relative_to: relative_to.to_owned(),
-        method: "of the solution, and along a B-H curve what saturation takes off the modes across the axis".to_owned(),
-    }
+        method:
+            "of the solution, and along a B-H curve what saturation takes off the modes across \
+                 the axis"
+                .to_owned(),
     };
     [
         (

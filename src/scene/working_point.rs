@@ -321,8 +321,8 @@ impl WorkingPoint {
     }
 }
 
-/// Adds to fields of the axisymmetric mode along the curve what the other modes add in the linear array, whose fields with
-/// and without them are `linear`, and returns the error of that, relative to the largest.
+/// Adds to fields of the axisymmetric mode along the curve what the other modes add in the linear array, whose fields are
+/// `all` with and `axial` without them, and returns the error of that, relative to the largest.
 fn add_transverse(
     along_t: &mut [f64],
     [all, axial]: [&[CoreField]; 2],

@@ -78,7 +78,7 @@ pub struct MeshReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
     /// Bodies whose triangles look inwards, where others look outwards.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_zero")]
     pub turned_bodies: usize,
     /// The bodies that the file names, in its order; absent where the format names none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -295,7 +295,7 @@ fn area(triangles: &[Triangle]) -> f64 {
     0.5 * twice.sum::<f64>()
 }
 
-fn is_none(count: &usize) -> bool {
+fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
