@@ -1,5 +1,6 @@
 //! The arguments that commands share, and the command line as a whole.
 
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 
 use std::path::PathBuf;
@@ -186,7 +187,7 @@ pub struct SurfaceFlags {
     #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::length_with_unit)]
     pub chord: Option<f64>,
     /// STEP: the one body or assembly to read, by name or number (see --inspect)
-    #[arg(long, hide_short_help = true, value_name = "N|NAME")]
+    #[arg(long, hide_short_help = true, value_name = "N|NAME", value_parser = NonEmptyStringValueParser::new())]
     pub body: Option<String>,
     /// Constraint points along x and y [default: 61x61; `lambda` and `calibrate`: as many as --error needs]
     #[arg(long, hide_short_help = true, value_name = "NxM", value_parser = values::grid_size)]

@@ -51,7 +51,7 @@ limits! {
     power_max_w: "power_max_w", si("W"), "heat at the rated current";
     mass_max_kg: "mass_max_kg", si("kg"), "mass of wire and core";
     wire_length_max_m: "wire_length_max_m", si("m"), "length of the wire";
-    core_field_max_t: "core_field_max_t", si("T"), "flux density in the core of one coil alone; `evaluate` warns where neighbours at their rated currents raise it further";
+    core_field_max_t: "core_field_max_t", si("T"), "flux density in the core of one coil alone; `evaluate` warns where neighbours raise it further";
     footprint_max_m: "footprint_max_mm", MM, "larger side of the rectangle that holds all coils and the plate";
     array_power_max_w: "array_power_max_w", si("W"), "most heat of all coils at currents that the supply allows, in their sum too, where signs count";
     static_power_max_w: "static_power_max_w", si("W"), "heat of all coils at the static currents of the shape that takes most, at its force constant; known only with shapes";

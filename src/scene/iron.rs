@@ -11,13 +11,14 @@ use crate::RunError;
 use crate::design::iron::{Hole, Iron as Described, IronShape, LinearSteel, PlateOutline};
 use crate::design::named_file::Role;
 use crate::design::{Coupling, Design};
-use crate::field::iron::array::{Depths, IronArray, IronPeaks, MOST_FACETS, Peak, Unsolved};
+use crate::field::iron::array::{IronArray, MOST_FACETS, Unsolved};
 use crate::field::iron::bodies::{
     Body, Coils, Contact, Fault, Iron, Outline, Piece, Plate, Site, Solid, UPRIGHT, contact,
 };
 use crate::field::iron::clearance::meeting_m;
 use crate::field::iron::face::Point;
 use crate::field::iron::mesh_body::MeshBody;
+use crate::field::iron::peaks::{Depths, IronPeaks, Peak};
 use crate::field::iron::prisms::connected;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::winding::Winding;
@@ -271,9 +272,9 @@ impl SceneIron {
         self.bodies.iter().map(|iron| &iron.body)
     }
 
-    /// Warnings about meshes that were put right, and about steel above its knee, where linear steel ends.
+    /// Sentences where steel is above its knee, where linear steel ends, with `currents`, as they are called.
     #[must_use]
-    pub fn warnings(&self, scene: &Scene, peaks: &IronPeaks, at: &str) -> Vec<String> {
+    pub fn above_knee(&self, scene: &Scene, peaks: &IronPeaks, currents: &str) -> Vec<String> {
         let of_core = scene
             .core
             .as_ref()
@@ -287,19 +288,18 @@ impl SceneIron {
         let core = above_knee_or(
             peaks.cores.iter().map(known),
             of_core,
-            &format!("a core of the array at {at}"),
+            &format!("a core of the array with {currents}"),
             THICKER,
             &finer,
         );
         let plate = above_knee_or(
             peaks.elsewhere.iter().map(known),
             self.knee_t,
-            &format!("the plate or [[iron]] at {at}"),
+            &format!("the plate or [[iron]] with {currents}"),
             THICKER,
             &finer,
         );
-        let put_right = self.put_right.iter().cloned();
-        put_right.chain(core).chain(plate).collect()
+        core.into_iter().chain(plate).collect()
     }
 
     /// How far inside its surface the largest |B| is looked for, m.

@@ -1,5 +1,6 @@
 //! A design made ready for computing: sources, coils, magnet, currents, tolerances.
 
+mod array_fields;
 pub mod at_current;
 pub mod cached_field;
 pub mod core_material;

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::array_fields::LargestCoreField;
+use super::array_fields::{ArrayFields, most_flux};
 use super::iron::middle;
-use super::knee::{FOR_CORES, above_knee};
 use super::rated::Rated;
 use super::steel::{LINEAR_CORES, Solved};
 use super::working_point::{WorkingPoint, relative_difference};
@@ -15,11 +16,7 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::circuit::Circuit;
 use crate::coil::mutual::{self, slowest_inductance_h};
 use crate::field::components::Components;
-use crate::field::iron::array::IronPeaks;
-use crate::field::steel::core_flux_density::{CoreField, peak_depth_m};
-
-/// Whose flux density is looked at.
-const CORES_AT_RATED: &str = "a core of the array with all coils at their rated currents";
+use crate::field::iron::peaks::IronPeaks;
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
@@ -43,6 +40,9 @@ pub struct ArraySummary {
     /// With a plate or other bodies of steel: what they carry.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iron: Option<IronSummary>,
+    /// The core that can carry the most; absent where neighbours' fluxes are left out, and without cores.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_core_field: Option<LargestCoreField>,
     /// The stages that miss the tolerance.
     #[serde(skip)]
     pub(crate) accuracy_missed: Vec<String>,
@@ -74,8 +74,6 @@ fn iron_summary(
     let Some(iron) = &scene.iron else {
         return Ok(None);
     };
-    accuracy.extend(iron_accuracy(peaks).map(|stage| ("iron_field", stage)));
-    warnings.extend(iron.warnings(scene, peaks, "all coils at their rated currents"));
     let alone = "coil, target and core describe one coil alone, without neighbours, [plate] and [[iron]]; array \
                  has the coils among all steel";
     warnings.push(alone.to_owned());
@@ -111,18 +109,6 @@ fn iron_pull(scene: &Scene) -> Result<Option<(f64, StageAccuracy)>, RunError> {
     let place = [x, y, scene.design.target_height_m];
     let pull = passive::pull(scene, &[place], false)?;
     Ok(pull.map(|pull| (pull.force_n(place)[2], passive::accuracy(&pull))))
-}
-
-/// How sure the largest flux densities are: the worst of cores, plate and bodies.
-fn iron_accuracy(peaks: &IronPeaks) -> Option<StageAccuracy> {
-    let all = peaks.cores.iter().chain(&peaks.elsewhere);
-    let relative = all.filter_map(|peak| Some(peak.error_t? / peak.field_t));
-    Some(StageAccuracy {
-        estimate: relative.reduce(f64::max)?,
-        relative_to: "the largest flux density of a core, or of the plate and [[iron]]".to_owned(),
-        method: "the difference from the next coarser panels, at the same place and of the largest"
-            .to_owned(),
-    })
 }
 
 /// All coils at their rated currents, along the B-H curve.
@@ -195,54 +181,17 @@ fn array(
     };
     accuracy.insert("mutual_inductance", stage);
     accuracy.extend(solved.linear_flux().map(|stage| (LINEAR_CORES, stage)));
-    let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
-    let knee_t = scene
-        .core
-        .as_ref()
-        .map_or(f64::INFINITY, |core| core.knee_t);
-    let rated_a = scene.rated_currents_a();
-    let working_point = match WorkingPoint::new(scene, &solved, &rated_a, lowest_m)? {
-        Some(point) => {
-            accuracy.insert("working_point", point.accuracy());
-            accuracy.extend(core_field_stages(point.core_field_errors));
-            peak_t.clone_from(&point.peak_field_t);
-            mean_t.clone_from(&point.mean_field_t);
-            warnings.extend(above_curve_s_knee(&peak_t, knee_t));
-            Some(working_point_summary(scene, &solved, &point, &air)?)
-        }
+    let (rated, largest_core_field) = core_fields(scene, &solved, &matrix, (accuracy, warnings))?;
+    let working_point = rated.working_point.as_ref();
+    let working_point = working_point
+        .map(|point| working_point_summary(scene, &solved, point, &air))
+        .transpose()?;
+    let iron = match &rated.iron {
+        Some(peaks) => iron_summary(scene, slowest.settling_s(), peaks, (accuracy, warnings))?,
         None => None,
     };
-    if let (Some(array), None) = (solved.steel().coupled(), &working_point) {
-        let depth_m = peak_depth_m(array.response.outline.shape);
-        let inside = array.core_fields(&rated_a, depth_m)?;
-        peak_t = inside.iter().map(|field| field.peak_t).collect();
-        mean_t = inside.iter().map(|field| field.mean_t).collect();
-        let largest = |error: fn(&CoreField) -> f64| inside.iter().map(error).fold(0.0, f64::max);
-        let errors = [
-            largest(|field| field.peak_error),
-            largest(|field| field.mean_error),
-        ];
-        accuracy.extend(core_field_stages(errors));
-        warnings.extend(above_knee(
-            inside
-                .iter()
-                .map(|field| (field.peak_t, field.peak_error * field.peak_t)),
-            knee_t,
-            CORES_AT_RATED,
-            FOR_CORES,
-        ));
-    }
-    let iron = match solved.iron_peaks(scene, &rated_a)? {
-        Some(peaks) => {
-            peak_t = peaks.cores.iter().map(|peak| peak.field_t).collect();
-            iron_summary(scene, slowest.settling_s(), &peaks, (accuracy, warnings))?
-        }
-        None => None,
-    };
-    // Among a plate and other bodies too.
-    warnings.extend(above_limit(scene, &peak_t));
     Ok(Some(ArraySummary {
-        coils: coils(scene, &matrix, [&peak_t, &mean_t]),
+        coils: coils(scene, &matrix, [&rated.peak_t, &rated.mean_t]),
         mutual_inductance_h: matrix,
         slowest_inductance_h: slowest.inductance_h,
         settling_s: slowest.settling_s(),
@@ -251,8 +200,46 @@ fn array(
             .then_some(solved.relative_permeability),
         working_point,
         iron,
+        largest_core_field,
         accuracy_missed,
     }))
+}
+
+/// |B| in the steel at the rated currents, and the core that can carry the most.
+fn core_fields(
+    scene: &Scene,
+    solved: &Solved,
+    matrix_h: &[Vec<f64>],
+    (accuracy, warnings): (&mut BTreeMap<&'static str, StageAccuracy>, &mut Vec<String>),
+) -> Result<(ArrayFields, Option<LargestCoreField>), RunError> {
+    let rated_a = scene.rated_currents_a();
+    let search = solved.iron_search(scene);
+    let at = |currents_a: &[f64]| ArrayFields::new(scene, solved, search.as_ref(), currents_a);
+    let rated = at(&rated_a)?;
+    accuracy.extend(rated.stages());
+    let put_right = scene.iron.iter().flat_map(|iron| &iron.put_right);
+    warnings.extend(put_right.cloned());
+    let above = rated.warnings(scene, "all coils at their rated currents");
+    if !solved.steel().couples() {
+        warnings.extend(above);
+        return Ok((rated, None));
+    }
+    let currents_a = most_flux(scene, matrix_h);
+    let most = at(&currents_a)?;
+    for (name, stage) in most.stages() {
+        let known = accuracy.entry(name).or_insert_with(|| stage.clone());
+        known.estimate = known.estimate.max(stage.estimate);
+    }
+    // What the rated currents do already is said once.
+    if above.is_empty() {
+        warnings.extend(most.warnings(scene, "currents within their limits whose fluxes add up"));
+    }
+    warnings.extend(above);
+    let largest = [rated.largest(&rated_a), most.largest(&currents_a)];
+    let by_peak =
+        |a: &LargestCoreField, b: &LargestCoreField| a.peak_field_t.total_cmp(&b.peak_field_t);
+    let largest = largest.into_iter().flatten().max_by(by_peak);
+    Ok((rated, largest))
 }
 
 /// Every coil with its inductance among the others; peak and mean of |B| in the cores, where they are known.
@@ -271,50 +258,6 @@ fn coils(scene: &Scene, matrix_h: &[Vec<f64>], fields_t: [&[f64]; 2]) -> Vec<Arr
         }
     })
     .collect()
-}
-
-/// A sentence where cores along a B-H curve pass its knee.
-fn above_curve_s_knee(peak_t: &[f64], knee_t: f64) -> Option<String> {
-    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
-    (most_t > knee_t).then(|| {
-        format!(
-            "{CORES_AT_RATED} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
-             proportion to the currents"
-        )
-    })
-}
-
-/// A sentence where neighbours take a core over the limit, which is of one coil.
-fn above_limit(scene: &Scene, peak_t: &[f64]) -> Option<String> {
-    let limit_t = scene.design.limits.core_field_max_t?;
-    let most_t = peak_t.iter().copied().fold(0.0, f64::max);
-    (most_t > limit_t).then(|| {
-        format!(
-            "{CORES_AT_RATED} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
-        )
-    })
-}
-
-/// How sure the flux densities in the array's cores are: the largest ones and the means.
-fn core_field_stages([peak, mean]: [f64; 2]) -> [(&'static str, StageAccuracy); 2] {
-    let stage = |estimate, relative_to: &str| StageAccuracy {
-        estimate,
-        relative_to: relative_to.to_owned(),
-        method:
-            "of the solution, and along a B-H curve what saturation takes off the modes across \
-                 the axis"
-                .to_owned(),
-    };
-    [
-        (
-            "array_core_field",
-            stage(peak, "the largest peak of a core of the array"),
-        ),
-        (
-            "array_core_field_mean",
-            stage(mean, "the largest mean of a core of the array"),
-        ),
-    ]
 }
 
 /// The windings' inductance matrix without steel, H, and the relative error of its entries, to

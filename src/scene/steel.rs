@@ -10,7 +10,8 @@ use super::prepared_field::PreparedField;
 use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::field::iron::array::{IronArray, IronPeaks};
+use crate::field::iron::array::IronArray;
+use crate::field::iron::peaks::PeakSearch;
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::array_request::{ArrayRequest, DriveCache, NoCache};
@@ -218,21 +219,12 @@ impl Solved {
         }
     }
 
-    /// The largest |B| in the plate and other bodies and in the cores at these currents; `None` where steel is cores alone.
-    ///
-    /// # Errors
-    /// A place on a winding's edge.
-    pub fn iron_peaks(
-        &self,
-        scene: &Scene,
-        currents_a: &[f64],
-    ) -> Result<Option<IronPeaks>, RunError> {
-        let (Some(iron), Some(array)) = (&scene.iron, self.steel().iron()) else {
-            return Ok(None);
-        };
-        Ok(Some(
-            array.peaks(currents_a, iron.depths(scene.core.as_ref()))?,
-        ))
+    /// Where the largest |B| in the plate, other bodies and the cores among them is looked for; `None` where steel is
+    /// cores alone.
+    #[must_use]
+    pub fn iron_search(&self, scene: &Scene) -> Option<PeakSearch<'_>> {
+        let (iron, array) = (scene.iron.as_ref()?, self.steel().iron()?);
+        Some(PeakSearch::new(array, iron.depths(scene.core.as_ref())))
     }
 
     /// The error of B at some of `points_m`, relative to |B| there; `None` where steel is cores alone, whose error holds

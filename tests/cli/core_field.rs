@@ -127,3 +127,36 @@ fn regression_a_map_left_the_pull_of_the_steel_out() {
     let name = b"passive_force_n.npy";
     assert!(bytes.windows(name.len()).any(|part| part == name));
 }
+
+/// Fluxes of parallel coils beside each other take from each other: with currents of both signs cores that are below
+/// their knee at the rated currents passed it, and nothing said so.
+#[test]
+fn regression_currents_of_both_signs_took_cores_above_their_knee_unsaid() {
+    let place = Place::new();
+    for core in ["relative_permeability = 1000\nknee_t = 1.25", CURVE] {
+        let report = evaluated(&place, &pair(core, "9\ncurrent_min_a = -9", ""));
+        let knee = report["core"]["knee_t"].as_f64().unwrap();
+        let largest = &report["array"]["largest_core_field"];
+        let peak = |value: &Value| value["peak_field_t"].as_f64().unwrap();
+        assert!(of_coils(&report, "peak_field_t")[0] < knee && peak(largest) > knee);
+        let warnings = report["warnings"].to_string();
+        assert!(
+            warnings.contains("with currents within their limits whose fluxes add up reaches"),
+            "{warnings}"
+        );
+        // As in a design whose rated currents are those.
+        assert_eq!(largest["currents_a"], serde_json::json!([9.0, -9.0]));
+        let both = pair(core, "[9, 0]\ncurrent_min_a = [0, -9]", "");
+        let both = evaluated(&place, &both);
+        let same = of_coils(&both, "peak_field_t");
+        let coil = largest["coil"].as_u64().unwrap() as usize;
+        assert!(
+            (same[coil] / peak(largest) - 1.0).abs() < 1e-9,
+            "{same:?} {largest}"
+        );
+        assert_eq!(
+            both["array"]["largest_core_field"]["currents_a"],
+            largest["currents_a"]
+        );
+    }
+}

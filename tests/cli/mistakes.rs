@@ -39,6 +39,13 @@ const MISTAKES: &[Mistake] = &[
         3,
         &["--direction-jnd", "--force-direction vertical-only"],
     ),
+    // A body without a name was every body.
+    (&["discretize", BALL, "--body", ""], 2, &["--body"]),
+    (
+        &["discretize", "nameless.toml"],
+        3,
+        &["body: names no body", "leave the key out"],
+    ),
     (
         &["discretize", BALL, "--out", "a.csv", "--over", SEED],
         2,
@@ -298,6 +305,10 @@ fn prepared() -> Place {
         let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
         place.write(name, &bytes);
     }
+    table(
+        "nameless.toml",
+        "name = \"parts\"\nsurface = \"parts.step\"\nbody = \"\"\n",
+    );
     table("empty.csv", "");
     table("header.csv", "x_m,y_m,z_m\n");
     table(

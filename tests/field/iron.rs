@@ -2,10 +2,11 @@
 
 use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::components::Components;
-use fluxform_field::iron::array::{Depths, IronArray, Unsolved};
+use fluxform_field::iron::array::{IronArray, Unsolved};
 use fluxform_field::iron::bodies::{
     Body, Coils, Fault, Iron, Outline, Piece, Plate, Site, Solid, UPRIGHT,
 };
+use fluxform_field::iron::peaks::{Depths, PeakSearch};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
 use fluxform_field::steel::cored_coil::CoredCoil;
@@ -101,7 +102,7 @@ fn the_estimate_covers_the_difference_from_coupled_cores() {
     assert!(array.relative_error <= 3e-3, "{}", array.relative_error);
     let known = CoupledArray::new(&WINDING, SHAPE, 1000.0, &positions_m, 1e-5, 0.02).unwrap();
     let currents = [1.0, -0.4];
-    let peaks = array.peaks(&currents, DEPTHS).unwrap();
+    let peaks = PeakSearch::new(&array, DEPTHS).peaks(&currents).unwrap();
     let inside = known.core_fields(&currents, 0.001).unwrap();
     for (peak, exact) in peaks.cores.iter().zip(&inside) {
         let (error_t, from_t) = (peak.error_t.unwrap(), (peak.field_t - exact.peak_t).abs());
@@ -223,7 +224,7 @@ fn a_plate_joins_the_cores_and_closes_the_flux() {
     let currents = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
     let at = |z: f64| array.field_t([0.001, 0.002, z], &currents).unwrap();
     assert!(at(-0.105)[2].abs() > 0.5 * at(-0.05)[2].abs());
-    let peaks = array.peaks(&currents, DEPTHS).unwrap();
+    let peaks = PeakSearch::new(&array, DEPTHS).peaks(&currents).unwrap();
     assert!(peaks.cores[4].field_t > at(-0.05)[2].abs(), "{peaks:?}");
     // All of the driven core's flux goes out through the plate about its foot, and crowds at the concave edge there.
     // Finer panels have 1.623 and 1.625 T in the core, 1.584 and 1.587 T in the plate.
@@ -384,7 +385,11 @@ fn the_largest_flux_density_is_inside_the_steel() {
         let iron = Iron::new(with, Some(&holed)).unwrap();
         let array = IronArray::new(with, &iron, 0.05, 0.03).unwrap();
         (
-            array.peaks(&[2.0], depths).unwrap().elsewhere.unwrap(),
+            PeakSearch::new(&array, depths)
+                .peaks(&[2.0])
+                .unwrap()
+                .elsewhere
+                .unwrap(),
             holed,
         )
     };

@@ -34,8 +34,9 @@ use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 /// design's [limits] it meets. With a steel core also the flux density in it at the rated current,
 /// and when current and force settle after a voltage step, eddy currents in the steel included. Of
 /// an array the inductance matrix is reported too, and the flux density in every core with all
-/// coils at their rated currents. A core above its steel's knee is warned of. Limits that are not
-/// met are part of the result; with --strict they end with exit code 4.
+/// coils at their rated currents and the largest with the currents whose fluxes add up in a core. A
+/// core above its steel's knee is warned of. Limits that are not met are part of the result; with
+/// --strict they end with exit code 4.
 #[derive(Debug, Args)]
 #[command(after_long_help = page(Codes::Reading, &[
     ("fluxform evaluate designs/seed.toml", "the seed's coil"),
@@ -351,6 +352,17 @@ fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
             let head = format!("|B| with all coils at their rated currents, {unit}");
             sheet.line(label, format!("{head}\n{rest}").trim_end());
         }
+    }
+    if let Some(most) = &array.largest_core_field {
+        sheet.line(
+            "core most",
+            &format!(
+                "up to {} T in core {} with currents whose fluxes add up, {}",
+                number_to(most.peak_field_t, 4),
+                most.coil,
+                describe::currents(design, &most.currents_a)
+            ),
+        );
     }
 }
 

@@ -651,9 +651,12 @@ impl PosedProblem<'_> {
     /// Warnings about the cores, at the chosen currents if there are any.
     fn core_warnings(&self, solution: &Solution) -> Result<Vec<String>, RunError> {
         if let (Some(iron), Some(chosen)) = (&self.scene.iron, &solution.chosen) {
-            let peaks = self.solved.iron_peaks(self.scene, &chosen.currents_a)?;
-            let above = |peaks| iron.warnings(self.scene, &peaks, "the chosen currents");
-            return Ok(peaks.map(above).unwrap_or_default());
+            let mut warnings = iron.put_right.clone();
+            if let Some(search) = self.solved.iron_search(self.scene) {
+                let peaks = search.peaks(&chosen.currents_a)?;
+                warnings.extend(iron.above_knee(self.scene, &peaks, "the chosen currents"));
+            }
+            return Ok(warnings);
         }
         let Some(core) = &self.scene.core else {
             return Ok(Vec::new());

@@ -3,13 +3,11 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 use super::axial_profile::AxialProfile;
 pub use super::bodies::RESOLUTIONS;
 use super::bodies::{Coils, Iron};
-use super::clearance::is_within;
-use super::face::{Node, Panel, Point, SAME_M};
+use super::face::{Node, Point, SAME_M};
 use super::inductance::{Linkage, least_h};
 use super::panel_columns::Targets;
 use super::potential::Branch;
@@ -32,12 +30,6 @@ pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
 const SOLVER_SHARE: f64 = 0.02;
 /// Share of the tolerance given to the integration of inductances.
 const FLUX_SHARE: f64 = 0.2;
-/// Part of the depth that a place below a node is inside the surface at least: a curved one bends towards it.
-const DEEP: f64 = 0.98;
-/// Steps from the best node to the largest |B|.
-const CLIMBS: usize = 12;
-/// Places, one after the other along the surface, that share the parts of panels close to them.
-const NEIGHBOURS: usize = 128;
 /// Accuracy of the windings' potential, relative to one face's.
 const POTENTIAL: f64 = 1e-9;
 
@@ -89,10 +81,10 @@ pub struct IronArray {
     pub positions_m: Vec<[f64; 2]>,
     /// The winding of every coil.
     pub winding: Winding,
-    surface: Surface,
+    pub(super) surface: Surface,
     /// Signs of the mirrored copies of the surface, and the planes.
-    images: Vec<[f64; 2]>,
-    planes_m: [f64; 2],
+    pub(super) images: Vec<[f64; 2]>,
+    pub(super) planes_m: [f64; 2],
     /// [image][node][drive], A/A.
     layers: Vec<Vec<f64>>,
     top_m: f64,
@@ -108,9 +100,9 @@ pub struct IronArray {
     /// Applications of the matrices.
     pub iterations: usize,
     /// A tolerance below which finer panels are taken, as far as memory allows; `None` where they are not.
-    finer_below: Option<f64>,
+    pub(super) finer_below: Option<f64>,
     /// The next coarser solution, by which errors are estimated; `None` of a resolution asked for.
-    coarser: Option<Box<Self>>,
+    pub(super) coarser: Option<Box<Self>>,
 }
 
 impl IronArray {
@@ -385,14 +377,14 @@ impl IronArray {
     }
 
     /// The layer of every image at these currents, A.
-    fn layers_at(&self, currents_a: &[f64]) -> Vec<Vec<f64>> {
+    pub(super) fn layers_at(&self, currents_a: &[f64]) -> Vec<Vec<f64>> {
         let sum = |row: &[f64]| row.iter().zip(currents_a).map(|(v, i)| v * i).sum();
         let of_image = |layers: &Vec<f64>| layers.chunks_exact(currents_a.len()).map(sum).collect();
         self.layers.iter().map(of_image).collect()
     }
 
     /// B at `places_m` of the windings and of the `layers` of every image.
-    fn fields_of(
+    pub(super) fn fields_of(
         &self,
         places_m: &[Point],
         currents_a: &[f64],
@@ -500,7 +492,12 @@ fn apart_m(a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 /// The drive that a mirrored copy makes of `drive`.
-fn moved(positions_m: &[[f64; 2]], drive: usize, [sx, sy]: [f64; 2], [cx, cy]: [f64; 2]) -> usize {
+pub(super) fn moved(
+    positions_m: &[[f64; 2]],
+    drive: usize,
+    [sx, sy]: [f64; 2],
+    [cx, cy]: [f64; 2],
+) -> usize {
     let [x, y] = positions_m[drive];
     let at = [cx + sx * (x - cx), cy + sy * (y - cy)];
     let place = positions_m
@@ -509,206 +506,6 @@ fn moved(positions_m: &[[f64; 2]], drive: usize, [sx, sy]: [f64; 2], [cx, cy]: [
     place.expect("only what the windings share is a mirror")
 }
 
-fn apart(a: Point, b: Point) -> f64 {
+pub(super) fn apart(a: Point, b: Point) -> f64 {
     norm(minus(a, b))
-}
-
-/// The largest |B| of a part of the steel.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Peak {
-    /// |B|, T.
-    pub field_t: f64,
-    /// Where, m.
-    pub place_m: Point,
-    /// Estimated error, T: the difference from what the next coarser resolution has here or as its own
-    /// largest; nothing where there is no coarser one.
-    pub error_t: Option<f64>,
-}
-
-/// How far inside the steel's surface the largest |B| is looked for, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Depths {
-    /// In cores.
-    pub cores_m: f64,
-    /// In the rest.
-    pub elsewhere_m: f64,
-}
-
-/// The largest |B| of every part of the steel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IronPeaks {
-    /// In the core of every coil; empty without cores.
-    pub cores: Vec<Peak>,
-    /// In the rest; `None` where none of that is magnetised.
-    pub elsewhere: Option<Peak>,
-    /// A tolerance below which finer panels are taken, as far as memory allows; `None` where they are not.
-    pub finer_below: Option<f64>,
-}
-
-impl IronArray {
-    /// The largest |B| with `currents_a` at least `depths` inside the steel's surface.
-    ///
-    /// # Errors
-    /// A place on a winding's edge.
-    pub fn peaks(&self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
-        let mut peaks = self.own_peaks(currents_a, depths)?;
-        let Some(coarser) = &self.coarser else {
-            return Ok(peaks);
-        };
-        let other = coarser.own_peaks(currents_a, depths)?;
-        let layers = coarser.layers_at(currents_a);
-        let compare = |peak: &mut Peak, other: &Peak| -> Result<(), OnEdge> {
-            let here = norm(coarser.fields_of(&[peak.place_m], currents_a, &layers)?[0]);
-            let apart = |value_t: f64| (peak.field_t - value_t).abs();
-            peak.error_t = Some(apart(here).max(apart(other.field_t)));
-            Ok(())
-        };
-        for (peak, other) in peaks.cores.iter_mut().zip(&other.cores) {
-            compare(peak, other)?;
-        }
-        if let (Some(peak), Some(other)) = (&mut peaks.elsewhere, &other.elsewhere) {
-            compare(peak, other)?;
-        }
-        Ok(peaks)
-    }
-
-    /// The same, without errors.
-    fn own_peaks(&self, currents_a: &[f64], depths: Depths) -> Result<IronPeaks, OnEdge> {
-        let mut nodes: Vec<Candidate> = Vec::new();
-        for (image, signs) in self.images.iter().enumerate() {
-            nodes.extend(self.surface.nodes.iter().enumerate().map(|(number, node)| {
-                let of = |core| moved(&self.positions_m, core, *signs, self.planes_m);
-                let core = self.surface.face_of(number).bore.map(of);
-                let node = mirrored(node, *signs, self.planes_m);
-                let depth_m = core.map_or(depths.elsewhere_m, |_| depths.cores_m);
-                Candidate {
-                    image,
-                    number,
-                    core,
-                    depth_m,
-                    place_m: inside(&node, depth_m),
-                }
-            }));
-        }
-        let faces = self.surface.whole_faces();
-        let is_deep = |place_m: Point, depth_m: f64| self.is_deep(&faces, place_m, depth_m);
-        let deep = |candidate: &&Candidate| is_deep(candidate.place_m, candidate.depth_m);
-        let candidates: Vec<&Candidate> = nodes.par_iter().filter(deep).collect();
-        let mut sparse: Vec<&Candidate> = Vec::new();
-        for candidate in candidates {
-            fluxform_base::progress::poll();
-            let least_m = 0.5 * candidate.depth_m;
-            let far = |other: &&Candidate| apart(candidate.place_m, other.place_m) >= least_m;
-            if sparse.iter().all(far) {
-                sparse.push(candidate);
-            }
-        }
-        let layers = self.layers_at(currents_a);
-        let fields_t = |places_m: &[Point]| -> Result<Vec<f64>, OnEdge> {
-            let fields = self.fields_of(places_m, currents_a, &layers)?;
-            Ok(fields.into_iter().map(norm).collect())
-        };
-        let places_m: Vec<Point> = sparse.iter().map(|candidate| candidate.place_m).collect();
-        let values = places_m
-            .par_chunks(NEIGHBOURS)
-            .map(fields_t)
-            .collect::<Result<Vec<Vec<f64>>, OnEdge>>()?
-            .concat();
-        let cores = if nodes.iter().any(|node| node.core.is_some()) {
-            currents_a.len()
-        } else {
-            0
-        };
-        // The best of every core, then of the rest.
-        let mut best: Vec<Option<(f64, &Candidate)>> = vec![None; cores + 1];
-        for (candidate, value) in sparse.into_iter().zip(values) {
-            let of = &mut best[candidate.core.unwrap_or(cores)];
-            if of.is_none_or(|(most, _)| value > most) {
-                *of = Some((value, candidate));
-            }
-        }
-        let climb = |best: Option<(f64, &Candidate)>| {
-            let peak = best.map(|(value, from)| self.climb(value, from, &is_deep, &fields_t));
-            peak.transpose()
-        };
-        let climbed = best.into_par_iter().map(climb);
-        let mut climbed = climbed.collect::<Result<Vec<Option<Peak>>, OnEdge>>()?;
-        Ok(IronPeaks {
-            elsewhere: climbed.pop().flatten(),
-            cores: climbed.into_iter().map(Option::unwrap_or_default).collect(),
-            finer_below: self.finer_below,
-        })
-    }
-
-    /// Whether a place is as far inside the surface as that: about it a layer's field grows without bound.
-    fn is_deep(&self, faces: &[(Panel, Range<usize>)], place_m: Point, depth_m: f64) -> bool {
-        fluxform_base::progress::poll();
-        let [cx, cy] = self.planes_m;
-        let [x, y, z] = place_m;
-        !self.images.iter().any(|[sx, sy]| {
-            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            is_within(&self.surface, faces, own, DEEP * depth_m)
-        })
-    }
-
-    /// From a node's place to the largest |B| about it, along the surface at the same depth.
-    fn climb(
-        &self,
-        value_t: f64,
-        from: &Candidate,
-        is_deep: &impl Fn(Point, f64) -> bool,
-        fields_t: &impl Fn(&[Point]) -> Result<Vec<f64>, OnEdge>,
-    ) -> Result<Peak, OnEdge> {
-        let face = self.surface.face_of(from.number);
-        let [[mut u, mut v], mut step] = self.surface.parameters(from.number);
-        let mut peak = Peak {
-            field_t: value_t,
-            place_m: from.place_m,
-            error_t: None,
-        };
-        for _ in 0..CLIMBS {
-            let before = peak.field_t;
-            let [du, dv] = step;
-            let (mut beside, mut places_m) = (Vec::new(), Vec::new());
-            for [a, b] in [[u + du, v], [u - du, v], [u, v + dv], [u, v - dv]] {
-                if !(0.0..=1.0).contains(&a) || !(0.0..=1.0).contains(&b) {
-                    continue;
-                }
-                let (place_m, area_m2) = face.point(a, b);
-                let node = Node { place_m, area_m2 };
-                let node = mirrored(&node, self.images[from.image], self.planes_m);
-                let place_m = inside(&node, from.depth_m);
-                if is_deep(place_m, from.depth_m) {
-                    beside.push([a, b]);
-                    places_m.push(place_m);
-                }
-            }
-            let values = fields_t(&places_m)?;
-            for ((at, place_m), value) in beside.into_iter().zip(places_m).zip(values) {
-                if value > peak.field_t {
-                    [u, v] = at;
-                    (peak.field_t, peak.place_m) = (value, place_m);
-                }
-            }
-            if peak.field_t == before {
-                step = step.map(|step| 0.5 * step);
-            }
-        }
-        Ok(peak)
-    }
-}
-
-/// A node, and the place below it where |B| is looked at.
-struct Candidate {
-    image: usize,
-    number: usize,
-    core: Option<usize>,
-    depth_m: f64,
-    place_m: Point,
-}
-
-/// The place so far below a node.
-fn inside(node: &Node, depth_m: f64) -> Point {
-    let by = depth_m / norm(node.area_m2);
-    std::array::from_fn(|i| node.place_m[i] - by * node.area_m2[i])
 }

@@ -24,6 +24,7 @@ mod near_windings;
 mod panel_columns;
 mod parts;
 pub mod passive;
+pub mod peaks;
 pub mod plate;
 pub mod potential;
 pub mod prisms;

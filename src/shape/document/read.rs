@@ -193,9 +193,14 @@ fn bodies(root: &mut Section<'_>) -> BodyOptions {
     }
     // A chord is far below any body's size: 10 um are no metres.
     let chord = root.number("chord_mm", &Rule::any("mm").positive());
+    let body = root.text("body").map(|body| body.value);
+    if body.as_deref() == Some("") {
+        let help = "name one, as --inspect lists them, or leave the key out";
+        root.fault("body", "names no body", help);
+    }
     BodyOptions {
         chord_m: chord.map(|chord| m_from_mm(chord.value)),
-        body: root.text("body").map(|body| body.value),
+        body,
     }
 }
 
