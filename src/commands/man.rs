@@ -111,6 +111,8 @@ fn add_pages(command: &clap::Command, pages: &mut Vec<(String, Vec<u8>)>) -> io:
 
 fn rendered(command: &clap::Command) -> io::Result<Vec<u8>> {
     let mut text = Vec::new();
-    Page::new(command.clone()).render(&mut text)?;
+    // Of what the short help leaves out the page would have the names alone.
+    let whole = command.clone().mut_args(|arg| arg.hide_short_help(false));
+    Page::new(whole).render(&mut text)?;
     Ok(text)
 }

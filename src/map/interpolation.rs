@@ -1,11 +1,12 @@
 //! The error of interpolating a map between its nodes.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::tabulate::{Components, Grid, MapError, PlacedCoil, tabulate};
 use fluxform_base::progress::Silent;
 use fluxform_field::source::AxialSource;
-use fluxform_numerics::lagrange;
+use fluxform_numerics::lagrange::{self, ORDER_NODES};
 
 /// The largest error found of a component, and at how many places it was looked for: relative to its largest value at
 /// the height, or on the planes of nodes around it where nodes miss the peak and that is smaller.
@@ -25,6 +26,8 @@ pub const SAFETY: f64 = 1.25;
 /// decide, and the highest because its stencil is one-sided.
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
+/// Most layers beside those that are looked at because the map itself changes faster there.
+const FASTER: usize = 3;
 /// Of an axis with so many nodes at most, quarters of cells are looked at too.
 const FEW: usize = 5;
 
@@ -62,8 +65,9 @@ pub fn error_scale(there: f64, nodes: (&[f64], &[f64]), z_m: f64) -> f64 {
     }
 }
 
-/// The middles of cells, faces and edges in the layers that decide; of a few cells their quarters too.
-fn staggered(grid: &Grid) -> [Grid; 7] {
+/// The middles of cells, faces and edges in the layers that decide, by how fast the map changes on the planes of
+/// nodes; of a few cells their quarters too.
+fn staggered(grid: &Grid, changes: &[f64]) -> [Grid; 7] {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let middles = |nodes: &[f64]| -> Vec<f64> {
         if nodes.len() < 2 {
@@ -90,14 +94,11 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
         if z.len() <= FEW {
             return heights;
         }
-        let top = heights.len().saturating_sub(HIGHEST);
-        let decides = |(k, _): &(usize, f64)| *k < LOWEST || *k >= top;
-        heights
-            .into_iter()
-            .enumerate()
-            .filter(decides)
-            .map(|(_, z)| z)
-            .collect()
+        // Of planes, or of the layers between two.
+        let beside = z.len() - heights.len();
+        let change = |k: usize| changes[k].max(changes[k + beside]);
+        let chosen = decisive(heights.len(), change);
+        chosen.into_iter().map(|k| heights[k]).collect()
     };
     [
         (inside(x), inside(y), inside(z)),
@@ -116,9 +117,52 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
     })
 }
 
+/// The lowest of so many layers and the highest, and those in which the map changes faster than in all of them.
+fn decisive(count: usize, change: impl Fn(usize) -> f64) -> Vec<usize> {
+    let top = count.saturating_sub(HIGHEST);
+    let (mut chosen, others): (Vec<usize>, Vec<usize>) =
+        (0..count).partition(|k| *k < LOWEST || *k >= top);
+    let known = chosen.iter().map(|k| change(*k)).fold(0.0, f64::max);
+    let mut faster: Vec<usize> = others.into_iter().filter(|k| change(*k) > known).collect();
+    faster.sort_by(|a, b| change(*b).total_cmp(&change(*a)));
+    chosen.extend(faster.into_iter().take(FASTER));
+    chosen.sort_unstable();
+    chosen
+}
+
+/// Of every plane of nodes the largest difference of as many orders as a cubic leaves out, along any axis, of one coil's
+/// values: what the error of interpolation follows.
+fn differences(map: &[f64], [columns, rows, planes]: [usize; 3]) -> Vec<f64> {
+    let axes = [(columns, 1), (rows, columns), (planes, columns * rows)];
+    let of_axis = |node: usize, (count, stride): (usize, usize)| -> f64 {
+        let place = (node / stride) % count;
+        let order = ORDER_NODES.min(count - 1);
+        let start = place.saturating_sub(order / 2).min(count - 1 - order);
+        let first = node - (place - start) * stride;
+        let mut parts: [f64; ORDER_NODES + 1] = [0.0; ORDER_NODES + 1];
+        for (k, part) in parts[..=order].iter_mut().enumerate() {
+            *part = map[first + k * stride];
+        }
+        for last in (1..=order).rev() {
+            for k in 0..last {
+                parts[k] = parts[k + 1] - parts[k];
+            }
+        }
+        parts[0].abs()
+    };
+    let of_node = |node: usize| axes.iter().map(|axis| of_axis(node, *axis)).sum::<f64>();
+    let plane = columns * rows;
+    let largest = |level: usize| {
+        (level * plane..(level + 1) * plane)
+            .map(of_node)
+            .fold(0.0, f64::max)
+    };
+    (0..planes).map(largest).collect()
+}
+
 /// Compares interpolated components (each [coil, z, y, x] on `grid`) with direct values in the
-/// middle of cells, faces and edges, in the four lowest layers and the highest, for
-/// a few coils that differ in where their axes lie: an error for each component.
+/// middle of cells, faces and edges, in the four lowest layers, the highest and those in which the map changes faster,
+/// for a few coils that differ in where their axes lie and those whose map changes fastest: an error for each component.
 ///
 /// # Errors
 /// Those of `direct`.
@@ -130,8 +174,8 @@ pub fn interpolation_errors_by(
 ) -> Result<Vec<InterpolationError>, MapError> {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let nodes = x.len() * y.len() * z.len();
-    let watched = watched(coils, grid);
     let plane_nodes = x.len() * y.len();
+    let (watched, changes) = decisive_coils(coils, grid, maps);
     let on_nodes: Vec<Vec<f64>> = maps
         .iter()
         .map(|map| {
@@ -150,7 +194,7 @@ pub fn interpolation_errors_by(
         samples: 0,
     };
     let mut all = vec![nothing; maps.len()];
-    for places in staggered(grid) {
+    for places in staggered(grid, &changes) {
         let exact = direct(&placed, &places)?;
         let plane = places.x_m.len() * places.y_m.len();
         let stencils = |nodes: &[f64], at: &[f64]| -> Vec<lagrange::Stencil> {
@@ -185,6 +229,37 @@ pub fn interpolation_errors_by(
         }
     }
     Ok(all)
+}
+
+/// The coils that are watched, and how fast the maps change on every plane of nodes, relative to the largest value there.
+fn decisive_coils(coils: &[PlacedCoil], grid: &Grid, maps: &[&[f64]]) -> (Vec<usize>, Vec<f64>) {
+    let counts = [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
+    let plane = counts[0] * counts[1];
+    let mut watched = watched(coils, grid);
+    let mut changes = vec![0.0_f64; counts[2]];
+    for map in maps {
+        let of_coils = map.par_chunks_exact(plane * counts[2]);
+        let mut all: Vec<Vec<f64>> = of_coils.map(|map| differences(map, counts)).collect();
+        for (level, largest) in changes.iter_mut().enumerate() {
+            let planes = map.chunks_exact(plane).skip(level).step_by(counts[2]);
+            let size = planes
+                .flatten()
+                .fold(0.0_f64, |most, value| most.max(value.abs()));
+            for of_coil in &mut all {
+                of_coil[level] = if size > 0.0 {
+                    of_coil[level] / size
+                } else {
+                    0.0
+                };
+                *largest = largest.max(of_coil[level]);
+            }
+        }
+        let change = |coil: &usize| all[*coil].iter().copied().fold(0.0, f64::max);
+        let fastest = (0..coils.len()).max_by(|a, b| change(a).total_cmp(&change(b)));
+        let known = watched.iter().map(change).fold(0.0, f64::max);
+        watched.extend(fastest.filter(|coil| change(coil) > known));
+    }
+    (watched, changes)
 }
 
 /// The coils nearest to the grid's centre and farthest from it, by index, and those whose axes are nearest to a node

@@ -25,8 +25,6 @@ const HELD_OUT: usize = 48;
 const MISSED: f64 = 4.0;
 /// See `map::interpolation`: samples find the largest error but for this factor.
 const SAFETY: f64 = 1.25;
-/// Layers of cells in which the interpolation's error is looked for.
-const LOWEST: usize = 4;
 
 /// The pull on a grid, and what is known of it.
 #[derive(Debug, Clone)]
@@ -110,8 +108,8 @@ impl PassiveMap {
     pub fn definition(&self) -> String {
         format!(
             "of the pull, relative to the largest pull at that height (on the nodes around it, where that is \
-             smaller): {SAFETY} times the largest difference from its table at {} places in the middles of cells, faces and edges, in the four \
-             lowest layers and the highest, where it is largest",
+             smaller): {SAFETY} times the largest difference from its table at {} places in the middles of cells, \
+             faces and edges",
             self.samples
         )
     }
@@ -175,16 +173,6 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
                 .collect(),
         }
     };
-    let layers = |heights: Vec<f64>| -> Vec<f64> {
-        let last = heights.len().saturating_sub(1);
-        let decides = |(k, _): &(usize, f64)| *k < LOWEST || *k == last;
-        heights
-            .into_iter()
-            .enumerate()
-            .filter(decides)
-            .map(|(_, z)| z)
-            .collect()
-    };
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let levels: Vec<f64> = values.chunks(x.len() * y.len()).map(largest).collect();
     let (mut worst, mut samples) = (0.0_f64, 0);
@@ -194,11 +182,7 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
         (x.clone(), middles(y), z.clone()),
         (x.clone(), y.clone(), middles(z)),
     ] {
-        let places = Grid {
-            x_m,
-            y_m,
-            z_m: layers(z_m),
-        };
+        let places = Grid { x_m, y_m, z_m };
         let exact = table.on(&places);
         let plane = places.x_m.len() * places.y_m.len();
         for (z_m, exact) in places.z_m.iter().zip(exact.chunks(plane)) {

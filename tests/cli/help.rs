@@ -179,6 +179,8 @@ fn completions_and_manual_pages() {
             page.contains(&format!(".TH fluxform-{command} 1")),
             "{page}"
         );
+        // Pages left out what options mean that the short help leaves out.
+        assert!(page.contains("Worker threads"), "{page}");
     }
     place.run(&["man", "--out", "man1"]).ends(0);
     place.write("man1/fluxform-map.1", "mine");

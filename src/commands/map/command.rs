@@ -173,6 +173,13 @@ impl Map {
         let out = self.out.as_ref().map(folder).transpose()?;
         let document = documents::design(&self.design, Need::MAP, printer)?;
         let design = &document.design;
+        if self.plot.is_some()
+            && self.components == Components::Gz
+            && design.magnet.tilt_deg != [0.0; 2]
+        {
+            let message = "--plot: the force on a tilted magnet takes more than dB_z/dz; add --components force";
+            return Err(Failure::Usage(message.to_owned()));
+        }
         let out = out.unwrap_or_else(|| Path::new("results").join(&design.name));
         let request = MapRequest {
             mag_manip: self.mag_manip(&out)?,

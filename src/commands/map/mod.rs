@@ -605,9 +605,10 @@ pub(crate) fn summary(made: &SceneMap, components: Components) -> MapSummary {
     let (map, between) = (&made.map, made.between);
     let definition = format!(
         "of dB_z/dz, relative to the largest |dB_z/dz| at that height (of the nodes around it, where that is \
-         smaller): 1.25 times the largest difference from direct values at {} places in the middles of cells, faces and edges, in the four \
-         lowest layers and the highest, where it is largest, of the innermost and the outermost coil and of \
-         those whose axes are nearest to a node and to the middle of a cell",
+         smaller): 1.25 times the largest difference from direct values at {} places in the middles of cells, faces \
+         and edges, in the four lowest layers, the highest and those in which the map changes faster, of the innermost \
+         and the outermost coil, of those whose axes are nearest to a node and to the middle of a cell, and of the one \
+         whose map changes fastest",
         between.samples
     );
     MapSummary {

@@ -23,8 +23,6 @@ pub const MOST_DEFAULT_NODES: usize = 31;
 
 /// Cells looked at along x and along y.
 const CELLS: usize = 16;
-/// The lowest layers of cells, and the highest, are looked at: the error falls with the height.
-const LOWEST: usize = 3;
 /// How far into its cell, along x, y and z, a place lies: on a node, where the gradient is off most; where the cubic's
 /// error is largest; in the middle; there on the layer of nodes, where along z no error makes up for those across.
 const PARTS_OF_CELL: [[f64; 3]; 5] = [
@@ -99,7 +97,7 @@ pub(super) fn make(
     let method = format!(
         "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
          central slopes) from direct values at {} places on nodes, in the middles of cells and of \
-         their faces and between, in the lowest layers and the highest, of every coil; and the nodes' own \
+         their faces and between, of every coil; and the nodes' own \
          error",
         samples.points_m.len()
     );
@@ -186,12 +184,8 @@ fn places(
     let x = spread(axes[0], within[0], CELLS);
     let y = spread(axes[1], within[1], CELLS);
     let layers = spread(axes[2], within[2], axes[2].samples);
-    let highest = layers.len().saturating_sub(1);
     let mut out = Vec::new();
-    for (k, z) in layers.iter().enumerate() {
-        if k >= LOWEST && k < highest {
-            continue;
-        }
+    for z in &layers {
         for parts in parts_of_cell {
             let place = |axis: usize, cell: &usize| AxisPosition {
                 cell: *cell,
