@@ -25,6 +25,8 @@ use super::seal::{SEAL, is_sealed};
 use super::table::{CurrentRow, PointRow};
 use fluxform_numerics::lagrange::{Cell, locate};
 
+/// The file of the map, by far the largest.
+const MAP: &str = "map.npz";
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
@@ -104,16 +106,28 @@ pub struct Bundle {
     pub manifest_sha256: String,
 }
 
+/// The folder of the bundle that `path` names, or whose manifest it names.
+fn folder_of(path: &Path) -> &Path {
+    match path.file_name() {
+        Some(name) if name == "manifest.json" => path.parent().unwrap_or(Path::new("")),
+        _ => path,
+    }
+}
+
 impl Bundle {
+    /// The size of the map of the bundle at `path`, which is not opened, in bytes; `None` where there is none.
+    #[must_use]
+    pub fn map_bytes(path: &Path) -> Option<u64> {
+        let map = folder_of(path).join(MAP).metadata().ok()?;
+        Some(map.len())
+    }
+
     /// Reads and checks the bundle in a folder (or the one whose `manifest.json` is given).
     ///
     /// # Errors
     /// [`BundleError`] for the first thing that is not as it must be.
     pub fn open(path: &Path) -> Result<Self, BundleError> {
-        let folder = match path.file_name() {
-            Some(name) if name == "manifest.json" => path.parent().unwrap_or(Path::new("")),
-            _ => path,
-        };
+        let folder = folder_of(path);
         let manifest_path = folder.join("manifest.json");
         let (manifest, text) = read_manifest(folder, &manifest_path)?;
         let manifest_sha256 = sha256_hex(&text);
@@ -315,7 +329,7 @@ pub fn bundles_below(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Parts of every bundle.
-const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
+const REQUIRED: [&str; 4] = [MAP, "points.csv", "currents.csv", "lambda.json"];
 
 fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), BundleError> {
     /// Of a newer manifest only this is understood.

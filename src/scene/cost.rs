@@ -10,6 +10,7 @@ use super::passive::iron_tolerance;
 use super::passive_iron::RegionPull;
 use super::sources::ShapeSource;
 use super::tolerances::Tolerances;
+use crate::bundle::load::Bundle;
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
 use crate::field::steel::array_cost::ArrayCost;
@@ -17,9 +18,14 @@ use crate::field::steel::passive::coupling_tolerance;
 pub use crate::map::Components;
 use crate::shape::document::{AxisRequest, ShapeDocument};
 use fluxform_base::uncertainty::Uncertainty;
+use std::path::Path;
 
 /// Bytes of a map's value: it is held twice, as it is computed and as it is written.
 const MAP_VALUE_BYTES: f64 = 16.0;
+/// Copies of a stored map, file and arrays, while it is replayed, and while it is computed again.
+pub const COPIES_REPLAYED: f64 = 3.6;
+/// See [`COPIES_REPLAYED`].
+pub const COPIES_VERIFIED: f64 = 5.25;
 /// Bytes of a component of mag_manip's field, with its text.
 const VECTOR_VALUE_BYTES: f64 = 36.0;
 /// Bytes of a constraint point, and of its force from one coil.
@@ -239,16 +245,16 @@ pub fn of_replay(positions: usize, coils: usize) -> Cost {
     }
 }
 
-/// A bundle's map of so many values, as it is held and computed again.
+/// The map of the bundle at `path`, of whose bytes so many `copies` are held; `None` where there is none.
 #[must_use]
-pub fn of_map_again(values: usize) -> Cost {
-    Cost {
-        what: format!("the bundle's map of {values} values"),
-        bytes: 2.0 * MAP_VALUE_BYTES * values as f64,
+pub fn of_stored_map(path: &Path, copies: f64) -> Option<Cost> {
+    Some(Cost {
+        what: "the bundle's map".to_owned(),
+        bytes: copies * Bundle::map_bytes(path)? as f64,
         cpu_seconds: 0.0,
         reduce: "calibrate with fewer nodes of [workspace]",
         misses: None,
-    }
+    })
 }
 
 /// The time that forces and force constants of `design` at the points of `shape` take.

@@ -92,9 +92,10 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         ends.push(area);
     }
     // Where facets of a body look to different sides, the sheets above a point tell inside from outside.
-    let closed = is_closed(triangles);
-    let by_sheets = closed && !is_oriented(triangles);
-    let sides = (closed && !by_sheets).then(|| Sides::new(triangles, parts(&weld(triangles, 0.0))));
+    let meeting = Meeting::of(mesh);
+    let by_sheets = meeting.closed && !meeting.oriented;
+    let sides = meeting.closed && meeting.oriented;
+    let sides = sides.then(|| Sides::new(triangles, parts(&meeting.names)));
     let is_turned = |facet: usize| match &sides {
         Some(sides) => sides.is_turned(facet),
         None => volume < 0.0,
@@ -145,7 +146,8 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         .map(look)
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
-    let unknown = sums[1] > 0 && !closed && disagrees(mesh);
+    let looks_apart = || !meeting.oriented || patches_look_apart(triangles, &meeting.names);
+    let unknown = sums[1] > 0 && !meeting.closed && looks_apart();
     Hidden {
         of_area: share(sums[1], sums[0]),
         of_upward: (!unknown).then(|| share(sums[3], sums[2])),
@@ -173,10 +175,46 @@ fn point_on([a, b, c]: Triangle, k: usize) -> [f64; 3] {
     [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]))
 }
 
-/// Whether neighbouring facets look to different sides.
-fn disagrees(mesh: &Mesh) -> bool {
-    let reach_m = WELD_ROUNDINGS * mesh.facts().plan_rounding_m;
-    Edges::new(&weld(mesh.triangles(), reach_m)).inconsistent > 0
+/// How the triangles of a mesh meet.
+struct Meeting {
+    names: Vec<[u32; 3]>,
+    closed: bool,
+    /// Whether neighbours look to the same side.
+    oriented: bool,
+}
+
+impl Meeting {
+    /// To the bit, or where that leaves the surface open, to the file's rounding.
+    fn of(mesh: &Mesh) -> Self {
+        let triangles = mesh.triangles();
+        if is_closed(triangles) {
+            return Self {
+                names: weld(triangles, 0.0),
+                closed: true,
+                oriented: is_oriented(triangles),
+            };
+        }
+        let names = weld(triangles, WELD_ROUNDINGS * mesh.facts().plan_rounding_m);
+        let edges = Edges::new(&names);
+        Self {
+            closed: edges.closed(),
+            oriented: edges.inconsistent == 0,
+            names,
+        }
+    }
+}
+
+/// Whether patches of an open surface that do not meet look to different sides, up and down, with more than a hundredth
+/// of the plan each.
+fn patches_look_apart(triangles: &[Triangle], names: &[[u32; 3]]) -> bool {
+    let (part_of, count) = parts(names);
+    let mut plan = vec![0.0; count];
+    for ([a, b, c], part) in triangles.iter().zip(part_of) {
+        plan[part as usize] += cross(minus(*b, *a), minus(*c, *a))[2];
+    }
+    let all: f64 = plan.iter().map(|plan: &f64| plan.abs()).sum();
+    let looks = |way: f64| plan.iter().any(|plan| way * plan > MOST_HIDDEN * all);
+    looks(1.0) && looks(-1.0)
 }
 
 /// How many sheets of the surface lie more than `depth_m` above a `point` on a `facet`.
@@ -401,6 +439,45 @@ mod tests {
             "{found:?}"
         );
         assert_eq!(found.warning(), None);
+        // Of two sheets that do not meet the upper one looking down covered nothing.
+        let sheet = |half: f64, z: f64, up: bool| {
+            let corner = |x: f64, y: f64| [half * x, half * y, z];
+            let [a, b] = [corner(-1.0, -1.0), corner(1.0, -1.0)];
+            let [c, d] = [corner(1.0, 1.0), corner(-1.0, 1.0)];
+            let facets = [[a, b, c], [a, c, d]];
+            if up {
+                facets
+            } else {
+                facets.map(|[p, q, r]| [q, p, r])
+            }
+        };
+        for (upper, lower, upward) in [
+            (true, true, Some(0.2)),
+            (false, true, None),
+            (true, false, None),
+            (false, false, Some(0.2)),
+        ] {
+            let sheets = [sheet(20.0, 10.0, upper), sheet(40.0, 0.0, lower)].concat();
+            let found = Hidden::of(&placed(sheets)).unwrap();
+            assert_eq!(found.of_upward.is_some(), upward.is_some(), "{found:?}");
+            let off = found.of_upward.unwrap_or(0.2) - 0.2;
+            assert!(
+                off.abs() < 0.01 && (found.of_area - 0.2).abs() < 0.01,
+                "{found:?}"
+            );
+        }
+        // Closed but for the last bits of its vertices, its facets turned round, it was open.
+        let ball = |shift: f64| {
+            let mut triangles = triangles_of(&washer);
+            for (k, triangle) in triangles.iter_mut().enumerate() {
+                if k % 2 == 1 {
+                    triangle.swap(0, 1);
+                    triangle[0][0] += shift;
+                }
+            }
+            Hidden::of(&placed(triangles)).unwrap().of_upward
+        };
+        assert!(ball(0.0).unwrap() < 1e-3 && ball(1e-14).unwrap() < 1e-3);
         // An unknown share was reported as none, without a warning.
         let open = mixed(&washer, false);
         assert_eq!(open.of_upward, None);

@@ -37,7 +37,7 @@ use crate::bundle::manifest::Manifest;
 use crate::map::Components;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::cost::{self, Cost};
+use crate::scene::cost::{self, COPIES_VERIFIED, Cost};
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::DesignSource;
 use crate::scene::tolerances::Tolerances;
@@ -163,10 +163,17 @@ impl<'a> Verifier<'a> {
         }
     }
 
+    fn allow(&self, costs: &[Cost]) -> Result<(), RunError> {
+        match self.limit {
+            Some(Limit(limit)) => limit(costs).map_err(RunError::Input),
+            None => Ok(()),
+        }
+    }
+
     fn check_costs(&self, sources: &Sources, bundle: &Bundle) -> Result<(), RunError> {
-        let Some(Limit(limit)) = self.limit else {
+        if self.limit.is_none() {
             return Ok(());
-        };
+        }
         let design = &sources.design;
         let made_with = bundle.manifest.made_with.as_ref();
         let of_error = made_with.and_then(|made| made.error).map(|error| {
@@ -193,14 +200,13 @@ impl<'a> Verifier<'a> {
             costs.extend(again().into_iter().chain(again()));
             let coils = design.array.positions_m.len();
             costs.push(cost::of_points(&shape.document, coils));
-            costs.push(cost::of_map_again(bundle.map.gz_t_per_m_per_a.len()));
             // Of its nodes the bundle holds those that the object needs.
             costs.push(Cost {
                 bytes: 0.0,
                 ..cost::of_map(design, Components::Gz)
             });
         }
-        limit(&costs).map_err(RunError::Input)
+        self.allow(&costs)
     }
 
     /// As [`run`].
@@ -214,6 +220,7 @@ impl<'a> Verifier<'a> {
         progress: &dyn Progress,
     ) -> Result<VerifyReport, RunError> {
         progress.begin("verify", 5);
+        self.allow(cost::of_stored_map(path, COPIES_VERIFIED).as_slice())?;
         let bundle = Bundle::open(path)?;
         progress.advance(1);
         let sources = Sources::of(&bundle)?;
