@@ -39,6 +39,22 @@ pub enum OneOrMany {
     Many(Vec<f64>),
 }
 
+/// Whether a text can name a design or a shape, and with it a folder: `[A-Za-z0-9._-]+`.
+///
+/// # Errors
+/// What is expected.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
+    let fits = (1..=NAME_MAX).contains(&name.len()) && name.chars().all(plain);
+    if fits && name != "." && name != ".." {
+        return Ok(());
+    }
+    Err(format!(
+        "expected 1 to {NAME_MAX} of A-Z a-z 0-9 . _ -, found {}",
+        quoted(name)
+    ))
+}
+
 impl<'a> Section<'a> {
     /// A number; `None` where absent, NaN where at fault.
     pub fn number(&mut self, key: &'static str, rule: &Rule) -> Option<Located<f64>> {
@@ -341,20 +357,13 @@ impl<'a> Section<'a> {
         let name = self
             .required_text("name", "add name = \"...\"; it names the output folder")?
             .value;
-        let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
-        if (1..=NAME_MAX).contains(&name.len())
-            && name.chars().all(plain)
-            && name != "."
-            && name != ".."
-        {
-            return Some(name);
+        match check_name(&name) {
+            Ok(()) => Some(name),
+            Err(message) => {
+                self.fault("name", message, "it names the output folder");
+                None
+            }
         }
-        let message = format!(
-            "expected 1 to {NAME_MAX} of A-Z a-z 0-9 . _ -, found {}",
-            quoted(&name)
-        );
-        self.fault("name", message, "it names the output folder");
-        None
     }
 
     /// A variant of `T` by name, the first where absent or at fault.

@@ -17,6 +17,7 @@ use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream, ask, can_ask};
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument, setting};
+use crate::design::values::check_name;
 
 /// Write a design and a shape to begin with
 ///
@@ -149,7 +150,8 @@ impl Init {
         };
         let mut request = self.request(start, object);
         if request.name.is_none() && !request.sets("name") {
-            request.name = Some(ask("Name of the design? ", start.name())?);
+            let name = |answer: &str| check_name(answer).map(|()| answer.to_owned());
+            request.name = Some(answered("Name of the design? ", start.name(), name)?);
         }
         for (key, question) in [
             ("array.pitch_mm", "Distance of neighbouring coils, mm? "),
@@ -158,22 +160,42 @@ impl Init {
             if request.sets(key) || (key.starts_with("array") && start == Start::Coil) {
                 continue;
             }
-            let answer = ask(question, "as in the template")?;
-            if answer != "as in the template" {
-                request
-                    .settings
-                    .push(setting(&format!("{key}={answer}")).map_err(Failure::Usage)?);
+            let as_there = "as in the template";
+            let number = |answer: &str| match answer.parse::<f64>() {
+                _ if answer == as_there => Ok(None),
+                Ok(value) if value > 0.0 && value.is_finite() => Ok(Some(value)),
+                _ => Err(format!("{answer:?} is no number above 0")),
+            };
+            if let Some(value) = answered(question, as_there, number)? {
+                let given = setting(&format!("{key}={value}"));
+                request.settings.push(given.map_err(Failure::Usage)?);
             }
         }
         Ok(request)
     }
 }
 
-/// A variant by its name, the first where the answer is empty; asked again otherwise.
+/// A variant by its name, the first where the answer is empty.
 fn chosen<T: Choice>(question: &str) -> Result<T, Failure> {
+    let named = |answer: &str| {
+        answer
+            .parse()
+            .map_err(|_| format!("{answer:?} is none of them"))
+    };
+    answered(question, T::VARIANTS[0].into(), named)
+}
+
+/// What `read` makes of an answer; where it says why it cannot, that and the question again.
+fn answered<T>(
+    question: &str,
+    default: &str,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Result<T, Failure> {
+    let mut asked = question.to_owned();
     loop {
-        if let Ok(one) = ask(question, T::VARIANTS[0].into())?.parse() {
-            return Ok(one);
+        match read(&ask(&asked, default)?) {
+            Ok(one) => return Ok(one),
+            Err(why) => asked = format!("{why}\n{question}"),
         }
     }
 }

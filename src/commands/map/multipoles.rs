@@ -49,21 +49,22 @@ pub(super) fn make(
     let top_m = scene.sources_top_m();
     if workspace.z_m.from <= top_m {
         return Err(RunError::Input(
-            "--mpem needs a workspace above the top face of windings and cores, where its sources \
-             lie: raise the lower end of [workspace] z_mm"
+            "--mpem needs a workspace above the top face of windings, cores and other steel, \
+             where its sources lie: raise the lower end of [workspace] z_mm"
                 .to_owned(),
         ));
     }
     let mut samples = direct(scene, solved, fitted_places(axes, top_m), progress)?;
     let heights = largest(&samples);
-    let mut checks = direct(scene, solved, compared_places(axes), progress)?;
+    let axes_m: Vec<[f64; 2]> = scene.coils.iter().map(|c| c.axis_m).collect();
+    let compared = compared_places(axes, &axes_m, scene.winding.outer_radius_m);
+    let mut checks = direct(scene, solved, compared, progress)?;
     for set in [&mut samples, &mut checks] {
         set.sizes = (set.points_m.iter())
             .map(|p| size_at(&heights, top_m, p[2]))
             .collect();
     }
 
-    let axes_m: Vec<[f64; 2]> = scene.coils.iter().map(|c| c.axis_m).collect();
     let coupled = solved.steel().couples();
     // Coils with common sources: all of them, or each for itself.
     let every: Vec<usize> = (0..axes_m.len()).collect();
@@ -224,8 +225,10 @@ fn fitted_places([x, y, z]: [Axis; 3], top_m: f64) -> Vec<[f64; 3]> {
 
 /// Scattered places: an additive sequence of irrational steps, without pattern and the same every
 /// time. Half of them lie in the lowest tenth of the heights, and many on the workspace's faces,
-/// where the error is largest.
-fn compared_places([x, y, z]: [Axis; 3]) -> Vec<[f64; 3]> {
+/// where the error is largest; then those about the coils' axes, lowest.
+fn compared_places([x, y, z]: [Axis; 3], axes_m: &[[f64; 2]], radius_m: f64) -> Vec<[f64; 3]> {
+    /// Places about an axis, half the outer radius away.
+    const ABOUT: usize = 6;
     /// Powers of the inverse of the root of t^4 = t + 1, and so spread evenly in three variables.
     const STEPS: [f64; 3] = [
         0.819_172_513_396_164_4,
@@ -236,22 +239,33 @@ fn compared_places([x, y, z]: [Axis; 3]) -> Vec<[f64; 3]> {
         let stretched = (0.5 + STRETCH * (part - 0.5)).clamp(0.0, 1.0);
         axis.from + (axis.to - axis.from) * stretched
     };
-    (1..=CHECKS)
-        .map(|k| {
-            let [a, b, c] = STEPS.map(|step| (0.5 + step * k as f64).fract());
-            let z = match k % 2 {
-                0 => between(z, c),
-                _ => between(
-                    Axis {
-                        to: z.from + LOW * (z.to - z.from),
-                        ..z
-                    },
-                    c,
-                ),
-            };
-            [between(x, a), between(y, b), z]
+    let scattered = (1..=CHECKS).map(|k| {
+        let [a, b, c] = STEPS.map(|step| (0.5 + step * k as f64).fract());
+        let z = match k % 2 {
+            0 => between(z, c),
+            _ => between(
+                Axis {
+                    to: z.from + LOW * (z.to - z.from),
+                    ..z
+                },
+                c,
+            ),
+        };
+        [between(x, a), between(y, b), z]
+    });
+    let about = axes_m.iter().flat_map(|[cx, cy]| {
+        (0..=ABOUT).map(move |k| {
+            let r_m = if k == 0 { 0.0 } else { 0.5 * radius_m };
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / ABOUT as f64).sin_cos();
+            [cx + r_m * cos, cy + r_m * sin, z.from]
         })
-        .collect()
+    });
+    let within = |place: &[f64; 3]| {
+        let ends = [(x, place[0]), (y, place[1])];
+        ends.iter()
+            .all(|(axis, at)| (axis.from..=axis.to).contains(at))
+    };
+    scattered.chain(about.filter(within)).collect()
 }
 
 /// The largest field and gradient at a height, between the planes at which they are known: both
@@ -296,7 +310,7 @@ mod tests {
     #[test]
     fn places_fill_the_workspace() {
         let fitted = fitted_places(AXES, 0.002);
-        let compared = compared_places(AXES);
+        let compared = compared_places(AXES, &[], 0.0);
         for (axis, at) in AXES.iter().zip(0..3) {
             let ends = |places: &[[f64; 3]]| {
                 places

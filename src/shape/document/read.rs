@@ -280,7 +280,10 @@ const MEANINGS: &[(&str, &str)] = &[
     ("length_mm", "of `half-cylinder`: its length"),
     ("low_mm", "of `wedge`: its height at the low side"),
     ("high_mm", "of `wedge`: its height at the high side"),
-    ("points.x_mm", "grid of constraint points along x"),
+    (
+        "points.x_mm",
+        "grid of constraint points along x; where neither is given `lambda` and `calibrate` take as many as --error needs",
+    ),
     ("points.y_mm", "grid of constraint points along y"),
     (
         "force",
