@@ -180,7 +180,7 @@ fn completions_and_manual_pages() {
             "{page}"
         );
         // Pages left out what options mean that the short help leaves out.
-        assert!(page.contains("Worker threads"), "{page}");
+        assert!(page.contains("Threads to compute with"), "{page}");
     }
     place.run(&["man", "--out", "man1"]).ends(0);
     place.write("man1/fluxform-map.1", "mine");
