@@ -26,8 +26,10 @@ pub const SAFETY: f64 = 1.25;
 /// decide, and the highest because its stencil is one-sided.
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
+/// A cell at the border has so much more error of the same difference, from a one-sided stencil: 43/24.
+const BORDER: f64 = 1.8;
 /// Most layers beside those that are looked at because the map itself changes faster there.
-const FASTER: usize = 3;
+const FASTER: usize = 4;
 /// Of an axis with so many nodes at most, quarters of cells are looked at too.
 const FEW: usize = 5;
 
@@ -135,6 +137,9 @@ fn decisive(count: usize, change: impl Fn(usize) -> f64) -> Vec<usize> {
 fn differences(map: &[f64], [columns, rows, planes]: [usize; 3]) -> Vec<f64> {
     let axes = [(columns, 1), (rows, columns), (planes, columns * rows)];
     let of_axis = |node: usize, (count, stride): (usize, usize)| -> f64 {
+        if count < 2 {
+            return 0.0;
+        }
         let place = (node / stride) % count;
         let order = ORDER_NODES.min(count - 1);
         let start = place.saturating_sub(order / 2).min(count - 1 - order);
@@ -148,7 +153,12 @@ fn differences(map: &[f64], [columns, rows, planes]: [usize; 3]) -> Vec<f64> {
                 parts[k] = parts[k + 1] - parts[k];
             }
         }
-        parts[0].abs()
+        let at_border = place < order / 2 || place + order / 2 >= count;
+        if at_border {
+            BORDER * parts[0].abs()
+        } else {
+            parts[0].abs()
+        }
     };
     let of_node = |node: usize| axes.iter().map(|axis| of_axis(node, *axis)).sum::<f64>();
     let plane = columns * rows;
@@ -231,7 +241,8 @@ pub fn interpolation_errors_by(
     Ok(all)
 }
 
-/// The coils that are watched, and how fast the maps change on every plane of nodes, relative to the largest value there.
+/// The coils that are watched, and how fast the maps change on every plane of nodes, relative to the largest value there
+/// or on the planes next to it.
 fn decisive_coils(coils: &[PlacedCoil], grid: &Grid, maps: &[&[f64]]) -> (Vec<usize>, Vec<f64>) {
     let counts = [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
     let plane = counts[0] * counts[1];
@@ -240,11 +251,15 @@ fn decisive_coils(coils: &[PlacedCoil], grid: &Grid, maps: &[&[f64]]) -> (Vec<us
     for map in maps {
         let of_coils = map.par_chunks_exact(plane * counts[2]);
         let mut all: Vec<Vec<f64>> = of_coils.map(|map| differences(map, counts)).collect();
-        for (level, largest) in changes.iter_mut().enumerate() {
+        let size = |level: usize| {
             let planes = map.chunks_exact(plane).skip(level).step_by(counts[2]);
-            let size = planes
-                .flatten()
-                .fold(0.0_f64, |most, value| most.max(value.abs()));
+            let sizes = planes.flatten().map(|value| value.abs());
+            sizes.fold(0.0, f64::max)
+        };
+        let sizes: Vec<f64> = (0..counts[2]).map(size).collect();
+        for (level, largest) in changes.iter_mut().enumerate() {
+            let near = &sizes[level.saturating_sub(1)..(level + 2).min(counts[2])];
+            let size = near.iter().copied().fold(f64::INFINITY, f64::min);
             for of_coil in &mut all {
                 of_coil[level] = if size > 0.0 {
                     of_coil[level] / size

@@ -89,11 +89,12 @@ impl ArrayFields {
         Ok(fields)
     }
 
-    /// The core with the largest peak, at `currents_a`, at which these fields are; `None` without cores.
+    /// The core with the largest peak, at `currents_a`, at which these fields are; `None` without cores, or without
+    /// current.
     pub fn largest(&self, currents_a: &[f64]) -> Option<LargestCoreField> {
         let peaks = self.peak_t.iter().copied().enumerate();
         let (coil, peak_field_t) = peaks.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        Some(LargestCoreField {
+        (peak_field_t > 0.0).then(|| LargestCoreField {
             coil,
             peak_field_t,
             mean_field_t: self.mean_t.get(coil).copied(),
@@ -111,36 +112,33 @@ impl ArrayFields {
         point.into_iter().chain(cores).chain(iron)
     }
 
-    /// Sentences where steel is above its knee or the design's limit, with `currents`, as they are called.
-    pub fn warnings(&self, scene: &Scene, currents: &str) -> Vec<String> {
+    /// Sentences where a core is above its knee, the plate or another body above its own, and a core above the design's
+    /// limit, with `currents`, as they are called.
+    pub fn warnings(&self, scene: &Scene, currents: &str) -> [Option<String>; 3] {
         let core = format!("a core of the array with {currents}");
         let knee_t = scene.core.as_ref().map(|core| core.knee_t);
         let knee_t = knee_t.unwrap_or(f64::INFINITY);
         let most_t = self.peak_t.iter().copied().fold(0.0, f64::max);
-        let mut warnings = Vec::new();
-        if self.working_point.is_some() && most_t > knee_t {
-            warnings.push(format!(
+        let along_curve = (self.working_point.is_some() && most_t > knee_t).then(|| {
+            format!(
                 "{core} reaches {most_t:.2} T, above its steel's knee at {knee_t:.2} T: the force grows less than in \
                  proportion to the currents"
-            ));
-        }
-        let linear = self
-            .peak_t
-            .iter()
-            .copied()
-            .zip(self.peak_errors_t.iter().copied());
-        warnings.extend(above_knee(linear, knee_t, &core, FOR_CORES));
-        if let (Some(iron), Some(peaks)) = (&scene.iron, &self.iron) {
-            warnings.extend(iron.above_knee(scene, peaks, currents));
-        }
-        if let Some(limit_t) = scene.design.limits.core_field_max_t
-            && most_t > limit_t
-        {
-            warnings.push(format!(
+            )
+        });
+        let errors_t = self.peak_errors_t.iter().copied();
+        let linear = self.peak_t.iter().copied().zip(errors_t);
+        let linear = above_knee(linear, knee_t, &core, FOR_CORES);
+        let [among_steel, elsewhere] = match (&scene.iron, &self.iron) {
+            (Some(iron), Some(peaks)) => iron.above_knee(scene, peaks, currents),
+            _ => [None, None],
+        };
+        let limit_t = scene.design.limits.core_field_max_t;
+        let limit = limit_t.filter(|limit_t| most_t > *limit_t).map(|limit_t| {
+            format!(
                 "{core} reaches {most_t:.2} T; limits.core_field_max_t = {limit_t} is of one coil alone"
-            ));
-        }
-        warnings
+            )
+        });
+        [along_curve.or(linear).or(among_steel), elsewhere, limit]
     }
 }
 

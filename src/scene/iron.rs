@@ -272,9 +272,15 @@ impl SceneIron {
         self.bodies.iter().map(|iron| &iron.body)
     }
 
-    /// Sentences where steel is above its knee, where linear steel ends, with `currents`, as they are called.
+    /// Sentences where a core, and where the plate or another body is above its knee, where linear steel ends, with
+    /// `currents`, as they are called.
     #[must_use]
-    pub fn above_knee(&self, scene: &Scene, peaks: &IronPeaks, currents: &str) -> Vec<String> {
+    pub fn above_knee(
+        &self,
+        scene: &Scene,
+        peaks: &IronPeaks,
+        currents: &str,
+    ) -> [Option<String>; 2] {
         let of_core = scene
             .core
             .as_ref()
@@ -299,7 +305,7 @@ impl SceneIron {
             THICKER,
             &finer,
         );
-        core.into_iter().chain(plate).collect()
+        [core, plate]
     }
 
     /// How far inside its surface the largest |B| is looked for, m.

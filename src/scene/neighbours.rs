@@ -219,23 +219,29 @@ fn core_fields(
     accuracy.extend(rated.stages());
     let put_right = scene.iron.iter().flat_map(|iron| &iron.put_right);
     warnings.extend(put_right.cloned());
-    let above = rated.warnings(scene, "all coils at their rated currents");
-    if !solved.steel().couples() {
-        warnings.extend(above);
-        return Ok((rated, None));
-    }
+    let mut above = rated.warnings(scene, "all coils at their rated currents");
     let currents_a = most_flux(scene, matrix_h);
+    if !solved.steel().couples() || currents_a == rated_a {
+        warnings.extend(above.into_iter().flatten());
+        let largest = solved.steel().couples().then(|| rated.largest(&rated_a));
+        return Ok((rated, largest.flatten()));
+    }
     let most = at(&currents_a)?;
     for (name, stage) in most.stages() {
         let known = accuracy.entry(name).or_insert_with(|| stage.clone());
         known.estimate = known.estimate.max(stage.estimate);
     }
-    // What the rated currents do already is said once.
-    if above.is_empty() {
-        warnings.extend(most.warnings(scene, "currents within their limits whose fluxes add up"));
+    // Of each kind one: that of the currents that take cores farthest.
+    let farthest = most.warnings(scene, "currents within their limits whose fluxes add up");
+    for (of_rated, of_most) in above.iter_mut().zip(farthest) {
+        *of_rated = of_most.or(of_rated.take());
     }
-    warnings.extend(above);
-    let largest = [rated.largest(&rated_a), most.largest(&currents_a)];
+    warnings.extend(above.into_iter().flatten());
+    // The rated currents need not keep the limit of their sum.
+    let total_a = scene.design.supply.total_current_max_a;
+    let within = total_a.is_none_or(|total_a| rated_a.iter().sum::<f64>() <= total_a);
+    let of_rated = within.then(|| rated.largest(&rated_a)).flatten();
+    let largest = [of_rated, most.largest(&currents_a)];
     let by_peak =
         |a: &LargestCoreField, b: &LargestCoreField| a.peak_field_t.total_cmp(&b.peak_field_t);
     let largest = largest.into_iter().flatten().max_by(by_peak);

@@ -144,6 +144,17 @@ fn regression_currents_of_both_signs_took_cores_above_their_knee_unsaid() {
             warnings.contains("with currents within their limits whose fluxes add up reaches"),
             "{warnings}"
         );
+        // A limit that is passed at the rated currents already took the word away.
+        let limited = "[limits]\ncore_field_max_t = 0.3\n";
+        let limited = pair(core, "9\ncurrent_min_a = -9", limited);
+        let warnings = evaluated(&place, &limited)["warnings"].to_string();
+        for words in [
+            "whose fluxes add up reaches",
+            "limits.core_field_max_t = 0.3 is of one coil",
+            "knee at",
+        ] {
+            assert!(warnings.contains(words), "{warnings}");
+        }
         // As in a design whose rated currents are those.
         assert_eq!(largest["currents_a"], serde_json::json!([9.0, -9.0]));
         let both = pair(core, "[9, 0]\ncurrent_min_a = [0, -9]", "");

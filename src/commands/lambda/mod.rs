@@ -654,7 +654,8 @@ impl PosedProblem<'_> {
             let mut warnings = iron.put_right.clone();
             if let Some(search) = self.solved.iron_search(self.scene) {
                 let peaks = search.peaks(&chosen.currents_a)?;
-                warnings.extend(iron.above_knee(self.scene, &peaks, "the chosen currents"));
+                let above = iron.above_knee(self.scene, &peaks, "the chosen currents");
+                warnings.extend(above.into_iter().flatten());
             }
             return Ok(warnings);
         }

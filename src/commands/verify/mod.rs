@@ -199,7 +199,13 @@ impl<'a> Verifier<'a> {
             let again = || cost::of_force_constants(design, &shape.document, tolerance);
             costs.extend(again().into_iter().chain(again()));
             let coils = design.array.positions_m.len();
-            costs.push(cost::of_points(&shape.document, coils));
+            let points = cost::of_points(&shape.document, coils);
+            // Beside the map.
+            let map = cost::of_stored_map(&bundle.folder, COPIES_VERIFIED);
+            costs.push(Cost {
+                bytes: points.bytes + map.map_or(0.0, |map| map.bytes),
+                ..points
+            });
             // Of its nodes the bundle holds those that the object needs.
             costs.push(Cost {
                 bytes: 0.0,
