@@ -353,14 +353,16 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
 /// The sideways force that the chosen currents and feedback leave.
 pub fn sideways(of: &Sideways) -> String {
     let off = |share: f64, degrees: f64| format!("{}, {degrees:.0} degrees off", percent(share));
+    // Where not all is reached its power is none of the price of reaching it.
     let points = if of.vector_reached == 1.0 {
-        "every point".to_owned()
+        "at every point, for".to_owned()
     } else {
-        format!("{} of the points", percent(of.vector_reached))
+        let reached = percent(of.vector_reached);
+        format!("at {reached} of the points; over all of them")
     };
     format!(
         "{} of the push with these currents\n{} with feedback of the upward force\n\
-         none with feedback of all components: at {points}, for {} times the power",
+         none with feedback of all components {points} {} times the power",
         off(of.static_share, of.static_median_deg),
         off(of.feedback_share, of.feedback_median_deg),
         number_to(of.vector_power_ratio, 3)

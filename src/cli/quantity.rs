@@ -103,10 +103,17 @@ pub fn mass(mass_kg: f64) -> String {
     si(mass_kg * 1000.0, "g")
 }
 
-/// A part of one in percent.
+/// A part of one in percent; what rounding leaves of nothing is none.
 #[must_use]
 pub fn percent(part: f64) -> String {
+    let part = if part.abs() < 1e-14 { 0.0 } else { part };
     format!("{} %", number_to(part * 100.0, 3))
+}
+
+/// An angle between forces, without its unit; what rounding leaves of nothing is none.
+#[must_use]
+pub fn degrees(angle_deg: f64) -> String {
+    number_to(if angle_deg < 1e-9 { 0.0 } else { angle_deg }, 3)
 }
 
 /// An estimated error: one or two digits and an exponent.

@@ -309,7 +309,11 @@ fn python_says_what_it_cannot_answer() {
     const SCRIPT: &str = "\
 import sys
 sys.path.insert(0, sys.argv[1])
-from load_bundle import Bundle, BundleError
+from load_bundle import Bundle, BundleError, _beside
+try:
+    _beside('elsewhere')
+except BundleError as error:
+    print(error)
 bundle = Bundle(sys.argv[2])
 for wrong in ([0, 0], [], [[0, 0, 0.03, 1]]):
     try:
@@ -338,6 +342,9 @@ for ask in (bundle.currents, bundle.requested_force):
         ran.out
     );
     assert_eq!(said("the bundle has no force constant"), 2, "{}", ran.out);
+    // Of a file that was copied without those beside it.
+    let beside = "this bundle needs elsewhere.py beside load_bundle.py";
+    assert_eq!(said(beside), 1, "{}", ran.out);
 }
 
 fn c_gives_the_forces_of_the_library() {

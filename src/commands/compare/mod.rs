@@ -510,9 +510,9 @@ fn unusual(status: Status) -> Option<&'static str> {
         Status::NothingWanted => {
             Some("every height is zero: no force is requested, lambda is null")
         }
-        Status::NothingRendered => {
-            Some("no current within the limits pushes the magnet up at its points: lambda is null")
-        }
+        Status::NothingRendered => Some(
+            "no currents within the limits, alike at all its points, push the magnet up on average: lambda is null",
+        ),
         Status::Stalled => Some(
             "the path over lambda could not be followed to its end: its numbers are not the \
              minimum; please report this design and shape",

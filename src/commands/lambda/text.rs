@@ -9,7 +9,7 @@ use crate::bundle::lambda_file::{
 };
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, headed_table};
-use crate::cli::quantity::{count, force, mm, number, number_to, percent};
+use crate::cli::quantity::{count, degrees, force, mm, number, number_to, percent};
 use crate::commands::discretize::PointsReport;
 use crate::design::Design;
 use crate::lambda::feedback::Rendered;
@@ -187,8 +187,8 @@ fn vector_lines(
         format!(
             "{name}: off by a median of {} degrees, 95 % within {}; error {} of the request, sideways {}\n  \
              given at {} of the points; {} W",
-            number_to(of.direction_median_deg, 3),
-            number_to(of.direction_95_deg, 3),
+            degrees(of.direction_median_deg),
+            degrees(of.direction_95_deg),
             percent(of.error_share),
             percent(of.sideways_share),
             percent(of.reached),
@@ -238,7 +238,7 @@ fn static_vector(file: &VectorStatic) -> Vec<String> {
             "static currents for the vector at {} N/m: off by a median of {} degrees; error {} of the request, \
              sideways {}\n  weighted error rms {}, worst {}, no less than {}; {} W",
             number(of.lambda_n_per_m),
-            number_to(of.rendering.direction_median_deg, 3),
+            degrees(of.rendering.direction_median_deg),
             percent(of.rendering.error_share),
             percent(of.rendering.sideways_share),
             force(of.weighted_rms_error_n),

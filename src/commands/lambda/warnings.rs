@@ -91,7 +91,7 @@ fn of_status(status: Status) -> Option<&'static str> {
             "every height is zero: no force is requested, so no limit binds and lambda is null",
         ),
         Status::NothingRendered => Some(
-            "no current within the limits pushes the magnet up at these points: lambda is null; \
+            "no currents within the limits, alike at all these points, push the magnet up on average: lambda is null; \
              check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a, the \
              coils that are broken and the object's place",
         ),

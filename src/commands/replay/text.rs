@@ -4,7 +4,7 @@ use super::ReplayReport;
 use super::felt::FeltErrors;
 use super::summary::{ErrorSummary, ForceSummary, ReplaySummary, VectorErrors};
 use crate::cli::layout::Sheet;
-use crate::cli::quantity::{count, error, force, number, number_to, percent, si};
+use crate::cli::quantity::{count, degrees, error, force, number, number_to, percent, si};
 use crate::force_direction::ForceDirection;
 
 /// Forces below this are rounding, N.
@@ -96,8 +96,8 @@ fn forces(sheet: &mut Sheet, title: &str, force: &ForceSummary) {
     if let Some(vector) = &force.vector {
         line += &format!(
             "\ndirection off by a median of {} degrees, 95 % within {}; error of the vector rms {}, worst {}",
-            number_to(vector.direction_median_deg, 3),
-            number_to(vector.direction_95_deg, 3),
+            degrees(vector.direction_median_deg),
+            degrees(vector.direction_95_deg),
             newton(vector.rms_error_n),
             newton(vector.worst_error_n)
         );

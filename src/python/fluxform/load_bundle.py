@@ -9,13 +9,15 @@
     currents, force, answer = bundle.currents([[0.01, 0.0, 0.05]])   # with position feedback (eq. 8)
     force = bundle.force_vectors_per_ampere([[0.01, 0.0, 0.05]])     # N/A along x, y, z, where it has them
 
-or on the command line: lambda, and the force of the static currents at points given as x,y,z in m:
+vector_dual.py must lie beside it for forces with a direction, expected_error.py for robust currents.
+Or on the command line: lambda, and the force of the static currents at points given as x,y,z in m:
 
     python3 load_bundle.py results/seed/flat 0.01,0,0.05 0.02,-0.01,0.05
 """
 
 import csv
 import hashlib
+import importlib
 import io
 import json
 import math
@@ -72,6 +74,14 @@ CONTENT_ERRORS = (
 
 class BundleError(Exception):
     """The bundle cannot be used; the message says why."""
+
+
+def _beside(module):
+    """A file beside this one, which bundles of the upward force alone do without."""
+    try:
+        return importlib.import_module(f".{module}" if __package__ else module, __package__)
+    except ImportError:
+        raise BundleError(f"this bundle needs {module}.py beside {os.path.basename(__file__)}") from None
 
 
 class Bundle:
@@ -320,10 +330,8 @@ class Bundle:
         """As `currents`, of the least expected error; the answers are those of exact positions."""
         if "robust_setting" not in self.map:
             raise BundleError("map.npz holds no robust_setting: the bundle was made without uncertainties")
-        try:
-            from .expected_error import ExpectedError, places
-        except ImportError:
-            from expected_error import ExpectedError, places
+        beside = _beside("expected_error")
+        ExpectedError, places = beside.ExpectedError, beside.places
         points_m = _rows(points_m)
         currents, force, answers = self.currents(points_m)
         vector = "requested_direction" in self.map
@@ -664,12 +672,7 @@ def _allocate_vector(force_per_ampere, wanted, r, lower, upper, total, sideways_
     weights = np.array([sideways_weight, sideways_weight, 1.0])
     rows = np.column_stack([force_per_ampere * weights * (1 / largest), np.ones(len(r))])
     target = np.append(wanted * weights * (1 / largest), total)
-    # Beside this file; bundles that request the upward force alone do without it.
-    try:
-        from .vector_dual import Dual
-    except ImportError:
-        from vector_dual import Dual
-    dual = Dual(rows, target, np.min(r) / r, lower, upper)
+    dual = _beside("vector_dual").Dual(rows, target, np.min(r) / r, lower, upper)
     with np.errstate(over="ignore", invalid="ignore"):
         reached = dual.solve()
     return dual.currents, reached
