@@ -136,9 +136,7 @@ pub struct Writing {
 
 /// How a surface that is given directly, without a shape file, is to be taken.
 #[derive(Debug, Clone, Args)]
-#[command(
-    next_help_heading = "Surfaces given directly (shape files say it themselves)"
-)]
+#[command(next_help_heading = "Surfaces given directly (shape files say it themselves)")]
 pub struct SurfaceFlags {
     /// mm, cm, m, in, ft, um; required for STL, OBJ, PLY, OFF, PNG
     #[arg(long, value_name = "UNIT", value_parser = values::unit)]

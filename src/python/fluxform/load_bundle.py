@@ -331,7 +331,6 @@ class Bundle:
         if "robust_setting" not in self.map:
             raise BundleError("map.npz holds no robust_setting: the bundle was made without uncertainties")
         beside = _beside("expected_error")
-        ExpectedError, places = beside.ExpectedError, beside.places
         points_m = _rows(points_m)
         currents, force, answers = self.currents(points_m)
         vector = "requested_direction" in self.map
@@ -345,14 +344,12 @@ class Bundle:
         # over the mean.
         warm = 0.5 * (1 + (2 * setting[3] - 1) ** 2)
         for k in np.flatnonzero(self.inside(points_m)):
-            near, weights = places(points_m[k], setting[1], ends)
+            near, weights = beside.places(points_m[k], setting[1], ends)
             rows = np.moveaxis(per_ampere(near).reshape(len(near), self.coil_count, -1), 1, 2)
             left = np.repeat(wanted[k : k + 1, 0 if vector else 2 :], len(near), axis=0)
             left[:, -1] -= warm * self.passive_force(near)
-            form = ExpectedError(
-                rows, left, weights, setting, self.map["resistance_ohm"], self.map["current_min_a"],
-                self.map["current_max_a"],
-            )
+            of_coils = [self.map[key] for key in ("resistance_ohm", "current_min_a", "current_max_a")]
+            form = beside.ExpectedError(rows, left, weights, setting, *of_coils)
             currents[k] = form.least(total, currents[k])
             given = currents[k] @ per_ampere(points_m[k])[0]
             force[k] = given + self.passive_force(points_m[k])[0] * np.array([0, 0, 1] if vector else 1)
