@@ -173,7 +173,7 @@ fn nothing_to_render_is_reported_not_computed() {
         "--format",
         "json",
     ]);
-    let ran = ran.ends(4).says(&["pushes the magnet up"]);
+    let ran = ran.ends(4).says(&["push the magnet up on average"]);
     let reported = ran.json();
     assert!(
         reported["lambda_n_per_m"].is_null()

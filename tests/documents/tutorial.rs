@@ -212,7 +212,7 @@ fn the_warnings_of_the_table_are_what_is_said() {
     }
     let cases = [
         (
-            "no current within the limits pushes the magnet up",
+            "no currents within the limits, alike at all these points, push the magnet up",
             "sed s/repel/attract/ desk.toml > a.toml; fluxform lambda a.toml plate.toml",
         ),
         (
