@@ -164,7 +164,7 @@ impl Init {
             let number = |answer: &str| match answer.parse::<f64>() {
                 _ if answer == as_there => Ok(None),
                 Ok(value) if value > 0.0 && value.is_finite() => Ok(Some(value)),
-                _ => Err(format!("{answer:?} is no number above 0")),
+                _ => Err(format!("{answer:?} is not a number above 0")),
             };
             if let Some(value) = answered(question, as_there, number)? {
                 let given = setting(&format!("{key}={value}"));
