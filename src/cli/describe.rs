@@ -353,7 +353,7 @@ pub fn requested_error(headline: &Headline) -> Option<String> {
 /// The sideways force that the chosen currents and feedback leave.
 pub fn sideways(of: &Sideways) -> String {
     let off = |share: f64, degrees: f64| format!("{}, {degrees:.0} degrees off", percent(share));
-    // Where not all is reached its power is none of the price of reaching it.
+    // The power is a mean over all points, not over those that are reached.
     let points = if of.vector_reached == 1.0 {
         "at every point, for".to_owned()
     } else {

@@ -26,8 +26,9 @@ pub const SAFETY: f64 = 1.25;
 /// decide, and the highest because its stencil is one-sided.
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
-/// A cell at the border has so much more error of the same difference, from a one-sided stencil: 43/24.
-const BORDER: f64 = 1.8;
+/// A cell at the border has so much more error of the same difference, from a one-sided stencil (see
+/// [`fluxform_numerics::lagrange`]).
+const BORDER: f64 = 43.0 / 24.0;
 /// Most layers beside those that are looked at because the map itself changes faster there.
 const FASTER: usize = 4;
 /// Of an axis with so many nodes at most, quarters of cells are looked at too.

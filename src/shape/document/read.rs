@@ -282,7 +282,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ("high_mm", "of `wedge`: its height at the high side"),
     (
         "points.x_mm",
-        "grid of constraint points along x; where neither is given `lambda` and `calibrate` take as many as --error needs",
+        "grid of constraint points along x; where neither x_mm nor y_mm is given, `lambda` and `calibrate` take as many as --error needs",
     ),
     ("points.y_mm", "grid of constraint points along y"),
     (
