@@ -41,21 +41,34 @@ fn largest_in_plane(bundle: &Bundle, values: &[f64], level: usize) -> f64 {
         .fold(0.0, |most: f64, g| most.max(g.abs()))
 }
 
-/// The largest |grad B| at each height of the map, T/m/A, at least: that on a coil's axis or over the map. Without
-/// currents at the place the trace of grad B is zero, so that |grad B|^2 is 3/2 (dB_z/dz)^2 at least.
+/// The largest |grad B| at each height of the map, T/m/A, at least: that on a coil's axis, above the edge of its winding
+/// or over the map. Without currents at the place the trace of grad B is zero, so that |grad B|^2 is 3/2 (dB_z/dz)^2 at
+/// least, and twice the squares of what is beside the diagonal.
 fn largest_gradients(bundle: &Bundle, route: &Route) -> Result<Vec<f64>, RunError> {
     let map = &bundle.map;
     let Some(coil) = map.coil.first().map(|coil| *coil as usize) else {
         return Ok(Vec::new());
     };
     let [x, y] = route.scene.coils[coil].axis_m;
-    let above: Vec<(usize, [f64; 3])> = map.z_m.iter().map(|z| (coil, [x, y, *z])).collect();
-    let on_axis = route.gradients(&above)?;
-    let levels = on_axis.iter().enumerate();
-    Ok(levels
-        .map(|(level, [_, _, gz])| {
+    let (top_m, edge_m) = (
+        route.scene.sources_top_m(),
+        route.scene.winding.outer_radius_m,
+    );
+    let of_level = |z: &f64| {
+        // Beside the sources the edge may lie in a neighbour.
+        let aside = if *z > top_m { edge_m } else { 0.0 };
+        [(coil, [x, y, *z]), (coil, [x + aside, y, *z])]
+    };
+    let places: Vec<(usize, [f64; 3])> = map.z_m.iter().flat_map(of_level).collect();
+    let found = route.gradients(&places)?;
+    let size = |[gx, gy, gz]: &[f64; 3]| (1.5 * gz * gz + 2.0 * (gx * gx + gy * gy)).sqrt();
+    Ok(found
+        .chunks(2)
+        .enumerate()
+        .map(|(level, found)| {
             let on_nodes = largest_in_plane(bundle, &map.gz_t_per_m_per_a, level);
-            1.5_f64.sqrt() * on_nodes.max(gz.abs())
+            let largest = found.iter().map(size).fold(0.0, f64::max);
+            largest.max(1.5_f64.sqrt() * on_nodes)
         })
         .collect())
 }

@@ -14,7 +14,7 @@ use super::CoreShape;
 pub use super::array_sources::ArraySources;
 use super::array_sources::{DipolePlace, Level};
 use super::core_layers::CoreLayers;
-use super::generatrix::Generatrix;
+use super::generatrix::{Generatrix, Node};
 use super::response::{RingPanel, Rings, ring_panels};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -93,17 +93,30 @@ fn parts_of_layer(
 ) -> Vec<f64> {
     let areas_m2: Vec<f64> = outline.areas_m2().collect();
     let mut parts = vec![0.0; panels.len()];
-    for (index, node) in outline.nodes.iter().enumerate() {
-        let own = &outline.panels[index / outline.order];
-        let at_m = own.coordinate_of(node);
-        let holds =
-            |(face, from, to): &RingPanel| *face == own.face && (*from..=*to).contains(&at_m);
-        let d = distance(node.z_m);
-        // A ring's part near a point is as long as its distance, at most the whole ring.
-        let share = (d / (PI * node.r_m)).min(1.0);
-        let dipole = 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4));
-        if let Some(panel) = panels.iter().position(holds) {
-            parts[panel] += areas_m2[index] * largest[index] * share * dipole;
+    for (index, own) in outline.panels.iter().enumerate() {
+        let nodes = index * outline.order..(index + 1) * outline.order;
+        // Each node's weight is the length around it: panels may be many between two nodes.
+        let mut end_m = own.range_m().0;
+        let mut ascending: Vec<usize> = nodes.collect();
+        if own.to_m < own.from_m {
+            ascending.reverse();
+        }
+        for node in ascending {
+            let Node {
+                r_m, z_m, weight_m, ..
+            } = outline.nodes[node];
+            let (low, high) = (end_m, end_m + weight_m);
+            end_m = high;
+            let d = distance(z_m);
+            // A ring's part near a point is as long as its distance, at most the whole ring.
+            let share = (d / (PI * r_m)).min(1.0);
+            let dipole = 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4));
+            let part = areas_m2[node] * largest[node] * share * dipole;
+            for ((face, from, to), sum) in panels.iter().zip(&mut parts) {
+                if *face == own.face {
+                    *sum += part * (high.min(*to) - low.max(*from)).max(0.0) / weight_m;
+                }
+            }
         }
     }
     parts
