@@ -3,12 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use fluxform_base::least_request::LEAST_REQUEST;
+
 use super::feedback::{Reachable, reachable};
 use super::problem::{ForceProblem, ProblemError};
-
-/// Ratios are looked at where at least this share of the largest force is requested: towards none
-/// they say nothing.
-const LEAST_REQUEST: f64 = 0.05;
 
 /// The upward force over the requested one: `lambda h`, times the upward part of the direction where the request leans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -80,15 +78,6 @@ impl Ratios {
             above_saturation,
         })
     }
-}
-
-/// The lowest height at which ratios to the requested force are looked at, m; `None` where no force is
-/// requested.
-#[must_use]
-pub fn lowest_requested_m(height_m: &[f64]) -> Option<f64> {
-    let highest_m = height_m.iter().copied().fold(0.0, f64::max);
-    let counted = height_m.iter().filter(|h| **h > LEAST_REQUEST * highest_m);
-    counted.copied().reduce(f64::min)
 }
 
 impl GivenForce {

@@ -81,7 +81,7 @@ pub mod worst;
 
 pub use allocation::{Allocation, Allocator, AllocatorError, Reach};
 pub use fluxform_base::force_constant::{Criterion, ForceConstants, Jnd, NamedConstant};
-pub use given::{GivenForce, lowest_requested_m};
+pub use given::GivenForce;
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, constant, relative_error, solve};

@@ -1,5 +1,6 @@
 //! The certificate of the points: against geometry known in closed form, and against brute force.
 
+use fluxform_base::least_request::lowest_requested_m;
 use fluxform_base::progress::{Progress, Silent};
 use fluxform_shape::certificate::{Certify, certify};
 use fluxform_shape::deviation::{
@@ -550,17 +551,38 @@ fn cells_one_by_one_add_up_to_the_whole() {
         [0, 1, 8, 9].iter().all(|k| heights[node + k].is_some())
     };
 
+    // Relative errors once were of the largest difference over the lowest of all heights.
+    let relative = |cells: &[Option<f64>], heights: &[Option<f64>]| {
+        let lowest_m = lowest_requested_m(heights.iter().flatten().copied()).unwrap();
+        let of_cell = |cell: usize| {
+            let node = cell / 7 * 8 + cell % 7;
+            let corners = [0, 1, 8, 9].iter().filter_map(|k| heights[node + k]);
+            let least_m = corners.fold(f64::INFINITY, f64::min).max(lowest_m);
+            cells[cell].map_or(0.0, |bound_m| bound_m / least_m)
+        };
+        (0..35).map(of_cell).fold(0.0, f64::max)
+    };
+
     let found = deviation::primitive_by_cell(&placed, &plan, &of_formula);
-    let bound_m = deviation::primitive(&placed, &plan, &of_formula).bound_m();
+    let together = deviation::primitive(&placed, &plan, &of_formula);
+    let bound_m = together.bound_m();
     assert_eq!(found.len(), 35);
     assert!((whole(&found) / bound_m - 1.0).abs() < 1e-5, "{bound_m}");
+    let ratio = together.relative.unwrap() / relative(&found, &of_formula);
+    assert!((ratio - 1.0).abs() < 1e-5, "{ratio}");
 
     let of_mesh = heights(&mesh, &plan);
     let faces = Faces::new(&mesh, &plan, Looks::endless());
     let lattice = Lattice::new(&faces, &plan, &of_mesh);
     let met = deviation::vertical_by_cell(&lattice, &Silent).unwrap();
-    let bound_m = vertical(&mesh, &plan, &lattice, &Silent).unwrap().bound_m();
+    let together = vertical(&mesh, &plan, &lattice, &Silent).unwrap();
+    let bound_m = together.bound_m();
     assert_eq!(met.len(), 35);
+    let ratio = together.relative.unwrap() / relative(&met, &of_mesh);
+    assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+    // Where heights differ much it is far from the one over the lowest.
+    let lowest_m = lowest_requested_m(of_mesh.iter().flatten().copied()).unwrap();
+    assert!(together.relative.unwrap() < 0.99 * bound_m / lowest_m);
     assert!((whole(&met) / bound_m - 1.0).abs() < 1e-9, "{bound_m}");
     for cell in 0..35 {
         assert_eq!(found[cell].is_some(), corners(&of_formula, cell), "{cell}");

@@ -9,7 +9,7 @@ use crate::bundle::bench::Reference;
 use crate::commands::lambda::{ForcePoints, ForcesAt};
 use crate::design::message_text::number;
 use crate::field::winding::KERNEL_ERROR;
-use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring, lowest_requested_m};
+use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring};
 use crate::map::FieldMap;
 use crate::map::interpolation::SAFETY;
 use crate::progress::Silent;
@@ -19,6 +19,7 @@ use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
 use crate::scene::{Scene, coupled};
+use fluxform_base::least_request::lowest_requested_m;
 
 /// The refined field's tolerance against the tightest of the ladder.
 const FINER: f64 = 0.1;
@@ -138,7 +139,7 @@ impl ForceError {
             }
             Self::Stated(_) => {
                 let off_n = self.at(0, &[], currents_a);
-                let lowest_m = lowest_requested_m(problem.height_m);
+                let lowest_m = lowest_requested_m(problem.height_m.iter().copied());
                 lowest_m.map_or(0.0, |lowest_m| off_n / (lambda_n_per_m * lowest_m))
             }
         })

@@ -2,8 +2,8 @@
 
 use super::PointsReport;
 use crate::bundle::headline::{BudgetName, BudgetPart};
-use crate::lambda::lowest_requested_m;
 use crate::shape::points::ConstraintPoints;
+use fluxform_base::least_request::lowest_requested_m;
 
 /// A change of slope beyond this from one node to the next is a jump: no grid of this spacing follows
 /// it.
@@ -12,31 +12,29 @@ const JUMP_SLOPE: f64 = 1.0;
 /// The part of heights between the points, and the share of places where the surface jumps.
 ///
 /// A runtime interpolates heights between points, and requests lambda times that. The certificate
-/// bounds how far that is off; where the surface jumps it is off by as much as it jumps, whatever the
+/// bounds how far that is off, of each cell relative to the lowest of its points; where the surface jumps it is off by as much as it jumps, whatever the
 /// grid. A node is at a jump where the slope changes by more than 1 (45 degrees) from one of its sides
 /// to the other: there heights beyond a quarter of the spacing off are left out, and the share of such
 /// nodes is stated. The rest is estimated from the second differences: of a bend anywhere in a cell
 /// interpolation is off by half of them at most.
 pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
     let found = &points.discretized.points;
-    let Some(lowest_m) = lowest_requested_m(&found.height_m) else {
+    let Some(lowest_m) = lowest_requested_m(found.height_m.iter().copied()) else {
         return (None, None);
     };
     let (bends, jumps) = second_differences(found, lowest_m);
-    let certified = points
-        .summary
-        .deviation
-        .map(|deviation| deviation.above_m.max(deviation.below_m));
+    let certificate = points.discretized.certificate.as_ref();
+    let certified = certificate.and_then(|certificate| certificate.vertical.relative);
     let part = |error: f64, how: &str| BudgetPart {
         part: BudgetName::BetweenPoints,
         error,
         how: how.to_owned(),
     };
     match certified {
-        Some(deviation_m) if jumps == 0 => (
+        Some(relative) if jumps == 0 => (
             Some(part(
-                deviation_m / lowest_m,
-                "the certified deviation of the interpolated heights over the lowest requested one",
+                relative,
+                "the certified deviation of the interpolated heights, of each cell over its lowest requested one",
             )),
             None,
         ),

@@ -4,8 +4,9 @@ use super::PosedProblem;
 use crate::RunError;
 use crate::bundle::headline::{BudgetName, BudgetPart, Headline};
 use crate::bundle::lambda_file::LambdaFile;
-use crate::lambda::{GivenForce, lowest_requested_m};
+use crate::lambda::GivenForce;
 use crate::progress::Progress;
+use fluxform_base::least_request::lowest_requested_m;
 
 /// Coils above whose axes the largest force is looked for.
 const MOST_COILS: usize = 9;
@@ -48,7 +49,7 @@ impl PosedProblem<'_> {
         let (Some(lambda), Some(currents_a)) = (lambda, &file.currents_a) else {
             return Ok(None);
         };
-        let Some(lowest_m) = lowest_requested_m(self.unwired.height_m) else {
+        let Some(lowest_m) = lowest_requested_m(self.unwired.height_m.iter().copied()) else {
             return Ok(None);
         };
         let amplification = Amplification {

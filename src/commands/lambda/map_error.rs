@@ -3,7 +3,6 @@
 
 use crate::RunError;
 use crate::bundle::headline::{BudgetName, BudgetPart};
-use crate::lambda::lowest_requested_m;
 use crate::map::FieldMap;
 use crate::numerics::lagrange::stencil;
 use crate::numerics::spread::spread;
@@ -13,6 +12,7 @@ use crate::scene::cached_field::ShapeField;
 use crate::scene::felt_force::by_map;
 use crate::scene::steel::Solved;
 use crate::shape::points::ConstraintPoints;
+use fluxform_base::least_request::lowest_requested_m;
 
 /// Cells in whose middle the map is compared with the field, at most.
 const MOST_PLACES: usize = 600;
@@ -21,7 +21,7 @@ const MARGIN: f64 = 1.5;
 
 /// Middles of cells whose four corners are points, with the mean of their heights.
 fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
-    let Some(lowest_m) = lowest_requested_m(&points.height_m) else {
+    let Some(lowest_m) = lowest_requested_m(points.height_m.iter().copied()) else {
         return Vec::new();
     };
     let rows = points.row_of_grid_point();

@@ -25,6 +25,7 @@ use crate::height::{Grid, heights, reach_m};
 use crate::index::Buckets;
 use crate::mesh::Mesh;
 use crate::vertical_hit::is_wall;
+use fluxform_base::least_request::lowest_requested_m;
 use fluxform_base::progress::{self, Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 
@@ -67,6 +68,9 @@ pub struct Vertical {
     pub rounding_m: f64,
     /// Largest distance of a bound of limited effort to the supremum, m; 0 where that is exact.
     pub slack_m: f64,
+    /// A bound of the largest difference relative to the lowest height of its cell at which a force is requested;
+    /// `None` without a cell of four points or a request.
+    pub relative: Option<f64>,
     /// Kind of the cells.
     pub cells: Cells,
 }
@@ -159,6 +163,27 @@ impl Looks {
     #[must_use]
     pub fn is_spent(&self) -> bool {
         self.left.load(Ordering::Relaxed) < 0
+    }
+}
+
+/// What differences over a cell are relative to: its lowest point, or the lowest that counts where that is higher.
+#[derive(Debug, Clone, Copy)]
+struct Requested {
+    lowest_m: f64,
+}
+
+impl Requested {
+    fn of(heights: &[Option<f64>]) -> Option<Self> {
+        let lowest_m = lowest_requested_m(heights.iter().flatten().copied())?;
+        Some(Self { lowest_m })
+    }
+
+    fn height_m(&self, patch: &Patch) -> f64 {
+        patch
+            .corners_m
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+            .max(self.lowest_m)
     }
 }
 
@@ -404,6 +429,7 @@ pub struct Lattice<'a> {
     x: Vec<f64>,
     y: Vec<f64>,
     heights: &'a [Option<f64>],
+    requested: Option<Requested>,
     /// Cells a side of a block.
     block: usize,
     /// The faces over each block.
@@ -434,6 +460,7 @@ impl<'a> Lattice<'a> {
         Self {
             faces,
             heights,
+            requested: Requested::of(heights),
             block: blocks.side,
             buckets: Buckets::new(blocks.count(), &pairs),
             x,
@@ -600,16 +627,14 @@ pub fn vertical(
     let start = start(mesh, grid, lattice, progress)?;
     let row = grid.x_m.samples.saturating_sub(1).max(1);
     progress.begin("deviation", lattice.len() as u64);
-    let rows: Result<Vec<Worst>, Interrupted> = (0..lattice.len().div_ceil(row))
+    let rows: Result<Vec<WorstOfCells>, Interrupted> = (0..lattice.len().div_ceil(row))
         .into_par_iter()
         .map(|index| {
             progress.check()?;
             let mut worst = start;
             for cell in index * row..((index + 1) * row).min(lattice.len()) {
                 if let Some(patch) = lattice.patch(cell) {
-                    worst = lattice
-                        .faces
-                        .worst(&patch.rect, &lattice.members(cell), &patch, worst);
+                    worst.compare(lattice, cell, &patch);
                 }
             }
             progress.advance(row as u64);
@@ -617,12 +642,19 @@ pub fn vertical(
         })
         .collect();
     progress.end();
-    let worst = rows?.into_iter().fold(start, Worst::or);
+    let worst = rows?.into_iter().fold(start, WorstOfCells::or);
+    let rounding_m = ROUNDINGS * lattice.faces.hair.height_m;
+    let WorstOfCells {
+        worst: Worst { above, below },
+        relative,
+    } = worst;
+    let requested = lattice.requested.filter(|_| cells.inner > 0);
     Ok(Vertical {
-        above: worst.above,
-        below: worst.below,
-        rounding_m: ROUNDINGS * lattice.faces.hair.height_m,
+        above,
+        below,
+        rounding_m,
         slack_m: 0.0,
+        relative: requested.map(|requested| relative.max(0.0) + rounding_m / requested.lowest_m),
         cells,
     })
 }
@@ -652,14 +684,57 @@ pub fn vertical_by_cell(
     cells
 }
 
+/// The largest differences over cells, and the largest relative to what is requested there.
+#[derive(Debug, Clone, Copy)]
+struct WorstOfCells {
+    worst: Worst,
+    relative: f64,
+}
+
+impl WorstOfCells {
+    const NONE: Self = Self {
+        worst: Worst::NONE,
+        relative: f64::NEG_INFINITY,
+    };
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            worst: self.worst.or(other.worst),
+            relative: self.relative.max(other.relative),
+        }
+    }
+
+    /// Compares a cell with its patch, as far as it may be the worst in either way.
+    fn compare(&mut self, lattice: &Lattice<'_>, cell: usize, patch: &Patch) {
+        let mut known = self.worst;
+        let requested_m = lattice.requested.map(|requested| requested.height_m(patch));
+        if let Some(requested_m) = requested_m {
+            for extreme in [&mut known.above, &mut known.below] {
+                extreme.value_m = extreme.value_m.min(self.relative * requested_m);
+            }
+        }
+        let found = lattice
+            .faces
+            .worst(&patch.rect, &lattice.members(cell), patch, known);
+        self.take(found, requested_m);
+    }
+
+    fn take(&mut self, found: Worst, requested_m: Option<f64>) {
+        self.worst = self.worst.or(found);
+        if let Some(requested_m) = requested_m {
+            self.relative = self.relative.max(found.value_m() / requested_m);
+        }
+    }
+}
+
 /// The differences at the cells' centres: with them most pieces need no closer look.
 fn start(
     mesh: &Mesh,
     grid: &Grid,
     lattice: &Lattice<'_>,
     progress: &dyn Progress,
-) -> Result<Worst, Interrupted> {
-    let mut worst = Worst::NONE;
+) -> Result<WorstOfCells, Interrupted> {
+    let mut worst = WorstOfCells::NONE;
     let middle = |axis: &Axis| Axis {
         from: axis.from + 0.5 * axis.step(),
         to: axis.to - 0.5 * axis.step(),
@@ -680,11 +755,17 @@ fn start(
         };
         let at_m = [x[cell % x.len()], y[cell / x.len()]];
         let value_m = sample.height_m - patch.height_m(at_m);
-        worst.above = worst.above.or(Extreme { value_m, at_m });
-        worst.below = worst.below.or(Extreme {
-            value_m: -value_m,
-            at_m,
-        });
+        let off = |value_m: f64| Extreme { value_m, at_m };
+        let found = Worst {
+            above: off(value_m),
+            below: off(-value_m),
+        };
+        worst.take(
+            found,
+            lattice
+                .requested
+                .map(|requested| requested.height_m(&patch)),
+        );
     }
     Ok(worst)
 }

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::piece::{Extreme, Patch, Point, Rect};
-use super::{Cells, Vertical};
+use super::{Cells, Requested, Vertical};
 use crate::height::{Grid, Sample};
 use crate::primitive::PlacedPrimitive;
 use fluxform_numerics::axis::Axis;
@@ -60,6 +60,10 @@ pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) 
     let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
     let mut open: Vec<(f64, Rect, Patch)> = Vec::new();
     let mut best = Extreme::NONE;
+    let requested = Requested::of(heights);
+    let over =
+        |patch: &Patch| requested.map_or(f64::INFINITY, |requested| requested.height_m(patch));
+    let mut relative = 0.0_f64;
     let mut cells = Cells::default();
     let mut largest_m = 0.0_f64;
     for row in 0..y.len().saturating_sub(1) {
@@ -82,24 +86,36 @@ pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) 
                 value_m: 0.0,
                 at_m: rect.low_m,
             });
-            open.push((look(shape, &rect, &patch, &mut best), rect, patch));
+            let (at, bound) = look(shape, &rect, &patch);
+            best = best.or(at);
+            relative = relative.max(at.value_m / over(&patch));
+            open.push((bound, rect, patch));
         }
     }
     let rounding_m = 16.0 * f64::EPSILON * largest_m;
     let mut looked = 0;
-    let mut bound = best.value_m;
+    let (mut bound, mut relative_bound) = (best.value_m, relative);
     while !open.is_empty() {
         let enough = best.value_m * (1.0 + NARROW) + rounding_m;
-        open.retain(|(bound, _, _)| *bound > enough);
+        let relative_enough = |patch: &Patch| relative * (1.0 + NARROW) + rounding_m / over(patch);
+        open.retain(|(bound, _, patch)| {
+            *bound > enough || *bound / over(patch) > relative_enough(patch)
+        });
         looked += 4 * open.len();
         bound = open.iter().fold(enough, |m, (bound, _, _)| m.max(*bound));
+        relative_bound = (open.iter()).fold(relative * (1.0 + NARROW), |m, (bound, _, patch)| {
+            m.max(*bound / over(patch))
+        });
         if looked > MOST {
             break;
         }
         let mut next = Vec::with_capacity(4 * open.len());
         for (_, rect, patch) in &open {
             for quarter in rect.quarters() {
-                next.push((look(shape, &quarter, patch, &mut best), quarter, *patch));
+                let (at, bound) = look(shape, &quarter, patch);
+                best = best.or(at);
+                relative = relative.max(at.value_m / over(patch));
+                next.push((bound, quarter, *patch));
             }
         }
         open = next;
@@ -112,25 +128,29 @@ pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) 
         },
         rounding_m,
         slack_m: (bound - best.value_m).max(0.0),
+        relative: requested
+            .filter(|_| cells.inner > 0)
+            .map(|requested| relative_bound + rounding_m / requested.lowest_m),
         cells,
     }
 }
 
-/// A bound of surface minus patch over the rectangle; the value at its centre may be the best.
-fn look(shape: &PlacedPrimitive, rect: &Rect, patch: &Patch, best: &mut Extreme) -> f64 {
+/// Surface minus patch at the centre of the rectangle, and a bound of it over all of that.
+fn look(shape: &PlacedPrimitive, rect: &Rect, patch: &Patch) -> (Extreme, f64) {
     let centre = rect.centre();
     let Some(Sample { height_m, normal }) = shape.sample(centre[0], centre[1]) else {
-        return 0.0;
+        return (Extreme::NONE, 0.0);
     };
-    *best = best.or(Extreme {
+    let at = Extreme {
         value_m: height_m - patch.height_m(centre),
         at_m: centre,
-    });
+    };
     let tangent = |p: Point| {
         let rise = normal[0] * (p[0] - centre[0]) + normal[1] * (p[1] - centre[1]);
         height_m - rise / normal[2]
     };
-    rect.corners().iter().fold(f64::NEG_INFINITY, |most, p| {
+    let bound = rect.corners().iter().fold(f64::NEG_INFINITY, |most, p| {
         most.max(tangent(*p) - patch.height_m(*p))
-    })
+    });
+    (at, bound)
 }
