@@ -30,6 +30,8 @@ const LEVEL: f64 = 1e-6;
 const MOST_HIDDEN: f64 = 0.01;
 /// Depths below this share of the surface's height count as seen.
 const DEPTH: f64 = 1e-6;
+/// A wall is hidden where this share of the surface's width beside it, on either side, something lies above.
+const ASIDE: f64 = 1e-5;
 
 /// Shares of a surface's area, to about a hundredth.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -77,20 +79,10 @@ impl Hidden {
 
 fn of_mesh(mesh: &Mesh) -> Hidden {
     let triangles = mesh.triangles();
-    let normal = |k: usize| {
-        let [a, b, c] = triangles[k];
-        cross(minus(b, a), minus(c, a))
-    };
-    // Ends of the triangles along the whole area, in their order.
+    let normal = |k: usize| normal_of(&triangles[k]);
     let bounds = mesh.facts().bounds;
-    let (mut area, mut volume) = (0.0, 0.0);
-    let mut ends = Vec::with_capacity(triangles.len());
-    for (k, triangle) in triangles.iter().enumerate() {
-        let normal = normal(k);
-        area += 0.5 * dot(normal, normal).sqrt();
-        volume += dot(minus(triangle[0], bounds.min_m), normal);
-        ends.push(area);
-    }
+    let (ends, volume) = ends_along_area(triangles, bounds.min_m);
+    let area = ends.last().copied().unwrap_or(0.0);
     // Where facets of a body look to different sides, the sheets above a point tell inside from outside.
     let meeting = Meeting::of(mesh);
     let by_sheets = meeting.closed && !meeting.oriented;
@@ -108,24 +100,34 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
     let index = Index::new(mesh, rules.reach_m);
     let depth_m =
         DEPTH * (bounds.max_m[2] - bounds.min_m[2]) + 2.0 * mesh.facts().height_rounding_m;
-    // Counts of points: all, hidden, facing up, of these hidden.
+    let width_m = bounds.plan().map(|[from, to]| to - from);
+    let aside_m = (ASIDE * width_m[0].max(width_m[1])).max(4.0 * rules.reach_m);
     let place = |k: usize| {
         let at = area * (k as f64 + 0.5) / POINTS as f64;
         let first = ends.partition_point(|end| *end < at);
         let facet = first.min(triangles.len() - 1);
         (facet, point_on(triangles[facet], k))
     };
+    // Counts of points: all, hidden, facing up, of these hidden.
     let look = |k: usize| -> [usize; 4] {
         fluxform_base::progress::poll();
         let (facet, point) = place(k);
         let normal = normal(facet);
         let level = LEVEL * dot(normal, normal).sqrt();
-        let p = [point[0], point[1]];
-        let above = sheets_above(triangles, index.at(p), (facet, point), depth_m, rules);
-        // A wall, seen edge-on, hides nothing by itself; the file's rounding may make it lean.
+        let above = |point: [f64; 3]| {
+            let touching = index.at([point[0], point[1]]);
+            sheets_above(triangles, touching, (facet, point), depth_m, rules)
+        };
+        // A wall is seen edge-on, from its side that lies open; the file's rounding may make it lean.
         if normal[2].abs() <= level || is_wall(&triangles[facet], rules.reach_m) {
-            return [1, 0, 0, 0];
+            let step_m = aside_m / normal[0].hypot(normal[1]);
+            let hidden = [step_m, -step_m].into_iter().all(|step_m| {
+                let [x, y] = [0, 1].map(|k| point[k] + step_m * normal[k]);
+                above([x, y, point[2]]) > 0
+            });
+            return [1, usize::from(hidden), 0, 0];
         }
+        let above = above(point);
         let up = usize::from(if by_sheets {
             above.is_multiple_of(2)
         } else {
@@ -152,6 +154,24 @@ fn of_mesh(mesh: &Mesh) -> Hidden {
         of_area: share(sums[1], sums[0]),
         of_upward: (!unknown).then(|| share(sums[3], sums[2])),
     }
+}
+
+/// Along the normal, twice as long as the triangle is large.
+fn normal_of([a, b, c]: &Triangle) -> [f64; 3] {
+    cross(minus(*b, *a), minus(*c, *a))
+}
+
+/// Ends of the triangles along the whole area, in their order, and six times the volume where they enclose one.
+fn ends_along_area(triangles: &[Triangle], low_m: [f64; 3]) -> (Vec<f64>, f64) {
+    let (mut area, mut volume) = (0.0, 0.0);
+    let mut ends = Vec::with_capacity(triangles.len());
+    for triangle in triangles {
+        let normal = normal_of(triangle);
+        area += 0.5 * dot(normal, normal).sqrt();
+        volume += dot(minus(triangle[0], low_m), normal);
+        ends.push(area);
+    }
+    (ends, volume)
 }
 
 /// The grid over a mesh's bounds.
@@ -209,8 +229,8 @@ impl Meeting {
 fn patches_look_apart(triangles: &[Triangle], names: &[[u32; 3]]) -> bool {
     let (part_of, count) = parts(names);
     let mut plan = vec![0.0; count];
-    for ([a, b, c], part) in triangles.iter().zip(part_of) {
-        plan[part as usize] += cross(minus(*b, *a), minus(*c, *a))[2];
+    for (triangle, part) in triangles.iter().zip(part_of) {
+        plan[part as usize] += normal_of(triangle)[2];
     }
     let all: f64 = plan.iter().map(|plan: &f64| plan.abs()).sum();
     let looks = |way: f64| plan.iter().any(|plan| way * plan > MOST_HIDDEN * all);
@@ -319,6 +339,11 @@ mod tests {
             (found.of_upward.unwrap() - share).abs() < 0.01,
             "{found:?} {share}"
         );
+        // The walls of foot and stem under the cap counted as seen: 2 r h of each, beside r^2 of what is level.
+        let [level, walls] = [25.0 + 21.0 + 32.0, 2.0 * (5.0 + 2.0 * 3.0)];
+        let seen = 36.0 + 2.0 * (6.0 + 0.1 * 5.0);
+        let share = (level + walls) / (level + walls + seen);
+        assert!((found.of_area - share).abs() < 0.01, "{found:?} {share}");
     }
 
     /// Within reach of its upper border a steep facet hid its neighbour.
