@@ -271,6 +271,25 @@ fn the_worth_of_limits_to_whole_turns_names_the_wire_that_it_is_of() {
     assert!(text.contains(worth), "{text}");
 }
 
+/// Whole turns leave room below the limits that hold the coil back: the page had them gain nothing.
+#[test]
+fn regression_whole_turns_hid_what_holds_the_coil_back() {
+    let place = Place::new();
+    let args = ["optimize", crate::SEED, "--wound", "--report", "best.html"];
+    let text = place.run(&args).ends(0).out;
+    let gives = "of resistance gives";
+    assert!(text.contains(gives), "{text}");
+    let page = place.text("best.html");
+    assert!(
+        page.contains("held back by outer diameter, resistance"),
+        "{page}"
+    );
+    assert!(
+        page.contains("What more of a limit gives is that of a coil"),
+        "{page}"
+    );
+}
+
 /// A search of two coils or three over a flat, with a limit and further choices.
 fn rows_of_coils(place: &Place, columns: &str, limit: &str) -> Vec<&'static str> {
     place.write(

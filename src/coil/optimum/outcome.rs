@@ -114,6 +114,13 @@ impl LimitUse {
             sensitivity_n_per_unit,
         }
     }
+
+    /// Whether it holds the force back: a coil of whole turns, which leave room below most limits, by what holds back
+    /// the one whose turns need not be whole.
+    #[must_use]
+    pub fn holds_back(&self) -> bool {
+        self.active || self.sensitivity_n_per_unit != 0.0
+    }
 }
 
 /// Relative difference from a limit that is a rounding.

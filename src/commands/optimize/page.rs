@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::compared::{ComparedCoil, PROPERTIES, Property};
 use super::result::Optimization;
-use super::text::better;
+use super::text::{before_whole, better};
 use crate::coil::optimum::LimitUse;
 use crate::coil::optimum::outcome::Alternative;
 use crate::report::frame::{Page, Section, foot};
@@ -96,6 +96,34 @@ fn answer(result: &Optimization) -> Section {
     }
 }
 
+/// What holds the force back, and warnings.
+fn said(result: &Optimization, limits: &[&LimitUse], body: &mut Html) {
+    let holding: Vec<String> = limits
+        .iter()
+        .filter(|limit| limit.holds_back())
+        .map(|limit| words(limit.name.key()).0)
+        .collect();
+    body.raw("<ul class=\"said\">");
+    let text = if holding.is_empty() {
+        "No limit holds the force back.".to_owned()
+    } else {
+        format!("The force is held back by {}.", holding.join(", "))
+    };
+    body.element("li", &text);
+    if let Some(whose) = before_whole(result).filter(|_| !holding.is_empty()) {
+        body.element(
+            "li",
+            &format!("What more of a limit gives is that {whose}."),
+        );
+    }
+    for warning in &result.warnings {
+        body.raw("<li><strong>Note:</strong> ")
+            .text(warning)
+            .raw("</li>");
+    }
+    body.raw("</ul>");
+}
+
 fn limits(result: &Optimization) -> Section {
     let mut body = Html::default();
     let limits: Vec<&LimitUse> = result
@@ -103,24 +131,7 @@ fn limits(result: &Optimization) -> Section {
         .values()
         .chain(result.bounds.values())
         .collect();
-    let active: Vec<String> = limits
-        .iter()
-        .filter(|limit| limit.active)
-        .map(|limit| words(limit.name.key()).0)
-        .collect();
-    body.raw("<ul class=\"said\">");
-    let text = if active.is_empty() {
-        "No limit holds the force back.".to_owned()
-    } else {
-        format!("The force is held back by {}.", active.join(", "))
-    };
-    body.element("li", &text);
-    for warning in &result.warnings {
-        body.raw("<li><strong>Note:</strong> ")
-            .text(warning)
-            .raw("</li>");
-    }
-    body.raw("</ul>");
+    said(result, &limits, &mut body);
     // The gain per percent compares limits of different units.
     let gain = |limit: &LimitUse| 0.01 * limit.limit * limit.sensitivity_n_per_unit;
     let most = limits.iter().map(|l| gain(l).abs()).fold(0.0, f64::max);
@@ -139,9 +150,9 @@ fn limits(result: &Optimization) -> Section {
             name.into(),
             in_unit(limit.value, unit).into(),
             in_unit(limit.limit, unit).into(),
-            if limit.active { "yes" } else { "no" }.into(),
+            if limit.holds_back() { "yes" } else { "no" }.into(),
             Cell::Markup(bar),
-            if limit.active {
+            if limit.holds_back() {
                 force(gain(limit))
             } else {
                 "none".to_owned()

@@ -84,10 +84,10 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
     }
     // A dimension that is given cannot move to its limit.
     let movable = result.limits.iter().chain(&result.bounds);
-    let movable = movable.filter(|(key, used)| used.active && !result.fixed.contains_key(*key));
-    let active: Vec<&LimitUse> = movable.map(|(_, used)| used).collect();
-    let (worth, shared): (Vec<&LimitUse>, Vec<&LimitUse>) =
-        (active.into_iter()).partition(|used| used.sensitivity_n_per_unit != 0.0);
+    let (worth, shared): (Vec<&LimitUse>, Vec<&LimitUse>) = movable
+        .filter(|(key, used)| used.holds_back() && !result.fixed.contains_key(*key))
+        .map(|(_, used)| used)
+        .partition(|used| used.sensitivity_n_per_unit != 0.0);
     let mut held: Vec<String> = worth.into_iter().map(sensitivity).collect();
     if shared.len() > 1 {
         let labels: Vec<&str> = shared.iter().map(|used| used.name.limit().label).collect();
@@ -267,9 +267,8 @@ fn misses(given: &GivenCoil) -> Option<String> {
     (!unmet.is_empty()).then(|| format!("the design's own coil misses {}", unmet.join("; ")))
 }
 
-/// `1 ohm more gives 12 mN`.
 /// Whose limits are worth what is stated, where turns are whole: the best coil's without that, perhaps of another wire.
-fn before_whole(result: &Optimization) -> Option<String> {
+pub(super) fn before_whole(result: &Optimization) -> Option<String> {
     let (before_m, coil) = (result.continuous_wire_diameter_m?, result.coil.as_ref()?);
     let wire = match before_m == coil.wire_diameter_m {
         true => String::new(),
@@ -280,6 +279,7 @@ fn before_whole(result: &Optimization) -> Option<String> {
     ))
 }
 
+/// `1 ohm more gives 12 mN`.
 fn sensitivity(used: &LimitUse) -> String {
     let row = used.name.limit();
     let (unit, per_si) = row.step;
