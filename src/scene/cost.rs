@@ -10,6 +10,7 @@ use super::passive::iron_tolerance;
 use super::passive_iron::RegionPull;
 use super::sources::ShapeSource;
 use super::tolerances::Tolerances;
+use crate::RunError;
 use crate::bundle::load::Bundle;
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
@@ -17,6 +18,7 @@ use crate::field::steel::array_cost::ArrayCost;
 use crate::field::steel::passive::coupling_tolerance;
 pub use crate::map::Components;
 use crate::shape::document::{AxisRequest, ShapeDocument};
+use crate::shape::memory::{self, POINT_BYTES};
 use fluxform_base::uncertainty::Uncertainty;
 use std::path::Path;
 
@@ -28,8 +30,7 @@ pub const COPIES_REPLAYED: f64 = 3.6;
 pub const COPIES_VERIFIED: f64 = 5.25;
 /// Bytes of a component of mag_manip's field, with its text.
 const VECTOR_VALUE_BYTES: f64 = 36.0;
-/// Bytes of a constraint point, and of its force from one coil.
-const POINT_BYTES: f64 = 320.0;
+/// Bytes of a force from one coil at one point, half of them its only component: computed and gathered.
 const FORCE_BYTES: f64 = 32.0;
 /// Bytes of a component of the field of one coil at one point, with its row of a table.
 const PROBE_VALUE_BYTES: f64 = 16.0;
@@ -177,11 +178,12 @@ pub struct Cost {
 #[must_use]
 pub fn of_map(design: &Design, components: Components) -> Cost {
     let parts = match components {
-        Components::Gz => 1.0,
+        Components::Gz => 1.1,
+        Components::Force if design.magnet.tilt_deg == [0.0; 2] => 6.5,
         // The tensor is computed first.
-        Components::Force => 12.0,
-        Components::Gradient => 10.0,
-        Components::All => 13.0,
+        Components::Force => 12.5,
+        Components::Gradient => 10.2,
+        Components::All => 13.2,
     };
     let workspace = &design.workspace;
     let samples = [workspace.x_m, workspace.y_m, workspace.z_m].map(|axis| axis.samples);
@@ -231,6 +233,18 @@ pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
         reduce: "ask for fewer points (x_mm and y_mm under [points], or --grid)",
         misses: None,
     }
+}
+
+/// Checks the forces of `coils` coils, of so many components, at so many points: of a surface their number may not be
+/// known before.
+///
+/// # Errors
+/// More memory than granted, and what to do.
+pub fn check_forces(points: usize, coils: usize, components: usize) -> Result<(), RunError> {
+    let each = POINT_BYTES + 0.5 * FORCE_BYTES * ((1 + components) * coils) as f64;
+    let what = format_args!("the forces of {coils} coils at {points} points");
+    let advice = "ask for fewer points, or for a larger error";
+    memory::within(each * points as f64, what, advice).map_err(RunError::Input)
 }
 
 /// A replay of so many positions.

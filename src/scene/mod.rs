@@ -412,6 +412,7 @@ impl<'a> Scene<'a> {
             of_rules(MagnetRule::reach_m),
             of_rules(MagnetRule::amplification),
         );
+        cost::check_forces(points_m.len(), coils, N)?;
         let mut forces = vec![[0.0; N]; points_m.len() * coils];
         let stage = if N > 1 { "sideways" } else { "forces" };
         progress.begin(stage, points_m.len() as u64);

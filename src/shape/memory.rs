@@ -1,8 +1,9 @@
-//! Memory that a surface's triangles take, held against what a run may take as soon as their number is known.
+//! Memory that triangles and points take, held against what a run may take as soon as their number is known.
 
+use std::fmt::Display;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Bytes that the triangles of a surface may take; everything unless [`grant`] was called.
+/// Bytes that a surface and its points may take; everything unless [`grant`] was called.
 static GRANTED: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Bytes of a triangle with its places in the index and the certificate, and of so many of them those that a finer
@@ -10,8 +11,10 @@ static GRANTED: AtomicU64 = AtomicU64::new(u64::MAX);
 const TRIANGLE_BYTES: u64 = 200;
 const FINE_INDEX_BYTES: u64 = 120;
 const FINELY_INDEXED: u64 = 1 << 22;
+/// Bytes of a constraint point, with its row of a table.
+pub const POINT_BYTES: f64 = 320.0;
 
-/// Grants the surfaces of this process so many bytes each.
+/// Grants each surface of this process, and its points, so many bytes.
 pub fn grant(bytes: u64) {
     GRANTED.store(bytes, Relaxed);
 }
@@ -21,17 +24,29 @@ pub fn grant(bytes: u64) {
 /// # Errors
 /// More bytes than granted, and what to do.
 pub(crate) fn check(triangles: u64) -> Result<(), String> {
-    let (bytes, granted) = (bytes_of(triangles), GRANTED.load(Relaxed));
+    let advice = "export the surface coarser (an image with fewer pixels)";
+    within(
+        bytes_of(triangles) as f64,
+        format_args!("its {triangles} triangles"),
+        advice,
+    )
+}
+
+/// Checks what would take so many `bytes`.
+///
+/// # Errors
+/// More than granted, and what to do: `advice`, or a larger grant.
+pub fn within(bytes: f64, what: impl Display, advice: &str) -> Result<(), String> {
+    let granted = GRANTED.load(Relaxed) as f64;
     if bytes <= granted {
         return Ok(());
     }
-    let million = |count: u64| count as f64 / 1e6;
     Err(format!(
-        "its {triangles} triangles would take about {:.0} MB of memory, and this run may take {:.0} MB: export the \
-         surface coarser (an image with fewer pixels), or grant more with --memory {:.0}MB",
-        million(bytes),
-        million(granted).floor(),
-        million(bytes + bytes / 10).ceil(),
+        "{what} would take about {:.0} MB of memory, and this run may take {:.0} MB: {advice}, or grant more with \
+         --memory {:.0}MB",
+        bytes / 1e6,
+        (granted / 1e6).floor(),
+        (1.1 * bytes / 1e6).ceil(),
     ))
 }
 

@@ -11,6 +11,7 @@ use crate::file_mesh::Bounds;
 use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
+use crate::memory::{self, POINT_BYTES};
 use crate::mesh::MeshFacts;
 use crate::point_areas::{FineCells, Over, areas_m2};
 use crate::point_flags::Marks;
@@ -224,7 +225,7 @@ pub fn discretize(
 /// The region that a document asks for, as a grid.
 ///
 /// # Errors
-/// [`ShapeError::Document`] for axes that do not ascend or have too many points.
+/// [`ShapeError::Document`] for axes that do not ascend or have too many points, or more than memory is granted for.
 pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid, ShapeError> {
     let [x, y] = bounds.plan();
     let grid = Grid {
@@ -238,6 +239,9 @@ pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid,
             grid.x_m.samples, grid.y_m.samples
         )));
     }
+    let what = format_args!("the {} x {} points", grid.x_m.samples, grid.y_m.samples);
+    let advice = "ask for fewer points, or for a larger error";
+    memory::within(POINT_BYTES * count as f64, what, advice).map_err(ShapeError::Document)?;
     Ok(grid)
 }
 

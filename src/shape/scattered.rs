@@ -10,13 +10,14 @@ use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample, reach_m};
 use crate::index::Index;
+use crate::memory::{self, POINT_BYTES};
 use crate::mesh::Mesh;
 use crate::point_areas::covered_share;
 use crate::point_flags::{self, Marks, Rules};
 use crate::primitive::PlacedPrimitive;
 use crate::surface::Surface;
 
-/// More points than this are refused.
+/// More points than this are refused, and those that take more memory than granted.
 const MOST_POINTS: usize = 5_000_000;
 /// Places a side at which a formula is looked for in a rectangle whose corners it leaves bare.
 const LOOKED_FOR: usize = 8;
@@ -270,8 +271,14 @@ impl<'a> Probe<'a> {
     }
 }
 
-fn too_many(what: &str) -> ShapeError {
-    ShapeError::Document(format!(
-        "more than {MOST_POINTS} points would be needed; {what}"
-    ))
+/// Checks a number of points that is needed at least.
+fn check_count(points: usize, advice: &str) -> Result<(), ShapeError> {
+    if points > MOST_POINTS {
+        return Err(ShapeError::Document(format!(
+            "more than {MOST_POINTS} points would be needed; {advice}"
+        )));
+    }
+    let bytes = POINT_BYTES * points as f64;
+    let what = format_args!("choosing {points} points");
+    memory::within(bytes, what, advice).map_err(ShapeError::Document)
 }

@@ -114,6 +114,38 @@ fn a_plan_solves_no_array() {
     assert!(ran.err.contains("10000 coupled cores"), "{}", ran.err);
 }
 
+/// Points that a surface or an error decides were chosen and computed whatever was granted.
+#[test]
+fn regression_points_that_are_chosen_took_no_notice_of_the_grant() {
+    let place = Place::new();
+    let shape = "shapes/half_sphere.toml";
+    let chosen: [&[&str]; 4] = [
+        &["discretize", shape, "--out", "p.csv", "--poisson", "0.1"],
+        &[
+            "discretize",
+            shape,
+            "--out",
+            "p.csv",
+            "--max-deviation",
+            "0.0001",
+        ],
+        &[
+            "discretize",
+            shape,
+            "--out",
+            "p.csv",
+            "--refine",
+            "--error",
+            "1e-5",
+        ],
+        &["lambda", SEED, shape, "--poisson", "0.5"],
+    ];
+    for args in chosen {
+        let ran = place.run(&[args, &["--memory", "10MB"]].concat());
+        ran.says(&["of memory, and this run may take 10 MB", "--memory"]);
+    }
+}
+
 /// `verify` and `replay` took what they needed whatever was granted.
 #[test]
 fn regression_commands_that_read_a_bundle_took_no_notice_of_the_grant() {

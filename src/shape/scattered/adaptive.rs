@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{MOST_POINTS, Probe, Scattered, too_many};
+use super::{Probe, Scattered, check_count};
 use crate::deviation::{Patch, Rect};
 use crate::error::ShapeError;
 use crate::height::Sample;
@@ -178,9 +178,7 @@ impl Work<'_> {
 
     fn refine(&mut self, low: Node, level: u32, members: &[u32]) -> Result<(), ShapeError> {
         self.progress.check()?;
-        if self.found > MOST_POINTS {
-            return Err(too_many("allow a larger deviation"));
-        }
+        check_count(self.found, "allow a larger deviation")?;
         let size = 1 << level;
         let rect = self.rect(low, size);
         let corners =

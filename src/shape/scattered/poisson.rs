@@ -5,7 +5,7 @@
 //! the area nearer to it than to any other: that over the cells of a finer grid, in parts of them, a cell that
 //! the surface leaves whole for one of its places; such a place that is a spacing or more from all points becomes one.
 
-use super::{MOST_POINTS, Probe, Scattered, too_many};
+use super::{Probe, Scattered, check_count};
 use crate::deviation::{Rect, Standing};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample};
@@ -61,9 +61,11 @@ pub fn poisson(
     let cell_m = spacing_m / std::f64::consts::SQRT_2;
     let sides = probe.plan_m.sides();
     let count = sides.map(|side| (side / cell_m).ceil().max(1.0) as usize);
-    if count[0].saturating_mul(count[1]) > 2 * MOST_POINTS {
-        return Err(too_many("take a larger spacing"));
-    }
+    // About every second one holds a point.
+    check_count(
+        count[0].saturating_mul(count[1]) / 2,
+        "take a larger spacing",
+    )?;
     let mut cells = Cells {
         low_m: probe.plan_m.low_m,
         cell_m,
