@@ -117,6 +117,16 @@ fn init_sets_keys_and_replaces_nothing_without_force() {
     place.write("desk.toml", "mine");
     place.run(&args).ends(4).says(&["desk.toml", "--force"]);
     assert_eq!(place.text("desk.toml"), "mine");
+    // Axes of one's own collided with the template's rows, columns and pitch.
+    let axes = "array.positions_mm=[[0, 0], [60, 0]]";
+    place
+        .run(&["init", "desk", "--name", "two", "--set", axes])
+        .ends(0);
+    let text = place.text("two.toml");
+    assert!(
+        text.contains("# rows = ") && text.contains("[60, 0]"),
+        "{text}"
+    );
     place
         .run(&["init", "desk", "--set", "array.pich_mm=3"])
         .ends(3)

@@ -114,7 +114,7 @@ pub struct Discretize {
         conflicts_with_all = ON_NO_GRID
     )]
     pub(super) over: Option<FileArgument>,
-    /// Draw heights, what each point is, and the deviation between them (.svg, .png
+    /// Draw heights, what each point of a grid is, and the deviation between them (.svg, .png
     /// or .pdf)
     #[arg(long, value_name = "FILE", value_parser = values::picture, conflicts_with_all = ON_NO_GRID)]
     pub(super) plot: Option<FileArgument>,

@@ -153,7 +153,13 @@ pub enum Refusal {
 /// Settings that make no design.
 pub fn documents(request: &Request) -> Result<Documents, Refusal> {
     let source = Path::new("--set");
-    let template = Template::new(request.start.toml(), source).map_err(Refusal::Design)?;
+    let mut template = Template::new(request.start.toml(), source).map_err(Refusal::Design)?;
+    // Axes that are given replace the template's grid.
+    if request.sets("array.positions_mm") {
+        for of_grid in ["array.rows", "array.columns", "array.pitch_mm"] {
+            template.remove(of_grid);
+        }
+    }
     let mut settings = request.settings.clone();
     if let Some(name) = &request.name {
         if request.sets("name") {

@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from . import expected_error, load_bundle, vector_dual
     from ._bundle import Bundle, Currents
     from ._commands import (
         Design, Lambda, Result, Shape, calibrate, compare, lambda_, optimize, replay, run, verify,
@@ -29,7 +30,8 @@ _HOMES = {
     ),
     "_errors": ("Error", "Fault", "InputError", "UnmetError", "UsageError", "VerificationError"),
 }
-__all__ = sorted(name for names in _HOMES.values() for name in names)
+_MODULES = ("expected_error", "load_bundle", "vector_dual")
+__all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 
 def __getattr__(name):
@@ -37,6 +39,8 @@ def __getattr__(name):
         from importlib.metadata import version
 
         return version("fluxform")
+    if name in _MODULES:
+        return import_module("." + name, __name__)
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module("." + home, __name__), name)

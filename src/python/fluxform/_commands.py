@@ -68,6 +68,8 @@ def run(command: str = "", *inputs, progress: Progress = None, kind=Result, **op
     result = result_of(json or b"{}", text, kind)
     if data:
         result.data = data.decode()
+        if not json:
+            result.text = result.data
     return result
 
 
@@ -138,8 +140,10 @@ class Shape(_Document):
 
     def points(self, **options) -> Result:
         """The constraint points: `x_m`, `y_m`, `height_m`, `normal_x` ... as arrays, and the summary
-        of `fluxform discretize`."""
-        result = run("discretize", self, out="-", **options)
+        of `fluxform discretize`; with `out` the points are in that file alone."""
+        result = run("discretize", self, **{"out": "-", **options})
+        if not hasattr(result, "data"):
+            return result
         head, _, rows = result.data.partition("\n")
         names = head.split(",")
         rows = rows.splitlines()
@@ -196,11 +200,12 @@ def verify(bundle, **options) -> Result:
     return run("verify", bundle, **options)
 
 
-def compare(*bundles, **options) -> Result:
-    """How differently two objects feel. As `fluxform compare`."""
-    return run("compare", *bundles, **options)
+def compare(design: Design, *shapes, **options) -> Result:
+    """How differently two objects or more feel. As `fluxform compare`."""
+    return run("compare", design, *shapes, **options)
 
 
-def replay(bundle, trajectory, **options) -> Result:
-    """The currents along a trajectory. As `fluxform replay`; `data` is its table."""
-    return run("replay", bundle, trajectory, **{"out": "-", **options})
+def replay(bundle, trajectory=None, **options) -> Result:
+    """The currents along a trajectory, a file or `synthesize="scan"`. As `fluxform replay`; `data` is its table."""
+    inputs = [bundle] if trajectory is None else [bundle, trajectory]
+    return run("replay", *inputs, **{"out": "-", **options})

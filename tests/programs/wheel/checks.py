@@ -121,6 +121,12 @@ def documents_in_memory():
     limits = "limits = { power_max_w = 5.0 }\ntarget = { height_mm = 20.0 }\n"
     best = fluxform.optimize(fluxform.Design.from_toml(AIR + limits, "memory.toml"))
     assert best.design.evaluate().coil.power_w <= 5.0 + 1e-9
+    assert len(fluxform.replay(bundle, synthesize="scan").data) > 100
+    other = fluxform.Shape.from_toml(DOME.replace("dome", "other"), "other.toml")
+    assert "pairs" in fluxform.compare(design, shape, other)
+    assert fluxform.load_bundle.Bundle(str(bundle.folder))
+    assert shape.points(out="points.csv").points > 0 and pathlib.Path("points.csv").exists()
+    assert "fluxform" in repr(fluxform.run("man"))
     plan = fluxform.run("sweep plan", design, set={"wire.diameter_mm": [0.5, 0.7]}, out="plan.json")
     assert plan.points == 2 and pathlib.Path("plan.json").exists()
 
