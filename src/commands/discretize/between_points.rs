@@ -11,12 +11,12 @@ const JUMP_SLOPE: f64 = 1.0;
 
 /// The part of heights between the points, and the share of places where the surface jumps.
 ///
-/// A runtime interpolates heights between points, and requests lambda times that. The certificate
-/// bounds how far that is off, of each cell relative to the lowest of its points; where the surface jumps it is off by as much as it jumps, whatever the
-/// grid. A node is at a jump where the slope changes by more than 1 (45 degrees) from one of its sides
-/// to the other: there heights beyond a quarter of the spacing off are left out, and the share of such
-/// nodes is stated. The rest is estimated from the second differences: of a bend anywhere in a cell
-/// interpolation is off by half of them at most.
+/// A runtime interpolates heights between points, and requests lambda times that. The certificate bounds how far
+/// that is off, of each cell relative to the lowest of its points; where the surface jumps it is off by as much as it
+/// jumps, whatever the grid. A node is at a jump where the slope changes by more than 1 (45 degrees) from one of its
+/// sides to the other: there heights beyond a quarter of the spacing off are left out, and the share of such nodes is
+/// stated. The rest is estimated from the second differences: of a bend anywhere in a cell interpolation is off by
+/// half of them at most.
 pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
     let found = &points.discretized.points;
     let Some(lowest_m) = lowest_requested_m(found.height_m.iter().copied()) else {
