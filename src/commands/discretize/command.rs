@@ -50,7 +50,7 @@ const OF_A_GRID: [&str; 7] = [
 ///
 /// How far the surface departs from bilinear interpolation between the points is certified. After
 /// the normal the table marks walls, rims, creases (with the other face's normal) and overhangs.
-/// Instead of the grid's own samples, --error chooses as few as keep heights between the points within it;
+/// Instead of the grid's own samples, --error chooses about as few as keep heights between them within it;
 /// instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
 /// points without a pattern; both give each point the area it stands for (weight_m2).
 ///

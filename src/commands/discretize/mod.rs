@@ -338,7 +338,7 @@ impl PointsReport {
 /// The outcome of a requested error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RequestedHeights {
-    /// Requested of heights between the points, relative to the lowest height that is rendered.
+    /// Requested of heights between the points, relative to the lowest one of their cell that counts.
     pub error: f64,
     /// Whether it holds.
     pub met: bool,
