@@ -149,10 +149,16 @@ fn anything_but_a_step_file_is_refused_before_python_starts() {
     assert!(said.contains("not a STEP file"), "{said}");
 }
 
+#[cfg(unix)]
+fn write_program(path: &Path, text: &str) {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::write(path, text).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
 /// Whatever stands in for Python, no number of it is believed unchecked.
 #[cfg(unix)]
 fn a_reader_that_answers_nonsense_is_refused() {
-    use std::os::unix::fs::PermissionsExt;
     let part = r#"{"points":9,"triangles":3,"deviation":0.1,"area":1,"volume":1,"mended":false}"#;
     let body =
         r#"{"part":0,"place":[[1,0,0,0],[0,1,0,0],[0,0,1,0]],"name":"","within":[],"color":null}"#;
@@ -185,16 +191,8 @@ fn a_reader_that_answers_nonsense_is_refused() {
         let fake = folder.path().join("fake");
         std::fs::write(folder.path().join("answer"), format!("{answer}\n")).unwrap();
         let script = "#!/bin/sh\ncat > /dev/null\ncat \"$(dirname \"$0\")/answer\"\n";
-        std::fs::write(
-            &fake,
-            if answer.is_empty() {
-                "#!/bin/sh\nexit 7\n"
-            } else {
-                script
-            },
-        )
-        .unwrap();
-        std::fs::set_permissions(&fake, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let silent = "#!/bin/sh\nexit 7\n";
+        write_program(&fake, if answer.is_empty() { silent } else { script });
         let fake = fake.display().to_string();
         let said = fluxform(
             &["--python", &fake, "discretize", "part.step"],
@@ -211,11 +209,9 @@ fn a_reader_that_answers_nonsense_is_refused() {}
 /// It uses no processor time, so its own limit never ends it.
 #[cfg(unix)]
 fn a_python_that_never_starts_is_not_waited_for() {
-    use std::os::unix::fs::PermissionsExt;
     let folder = boxed(&|text| text);
     let fake = folder.path().join("fake");
-    std::fs::write(&fake, "#!/bin/sh\nexec sleep 100000\n").unwrap();
-    std::fs::set_permissions(&fake, std::fs::Permissions::from_mode(0o755)).unwrap();
+    write_program(&fake, "#!/bin/sh\nexec sleep 100000\n");
     let fake = fake.display().to_string();
     let arguments = [
         "--python",
@@ -541,9 +537,21 @@ fn a_body_is_chosen_by_name_or_number() {
     );
 }
 
+/// The time that loading OpenCASCADE takes once counted, so that a slow machine's Python "ended before it read anything".
+#[cfg(unix)]
 fn a_reading_that_takes_too_long_is_ended() {
     let folder = parts();
+    // A Python that takes more than the limit to start.
+    let slow = folder.path().join("slow");
+    let busy = "import time\nwhile time.process_time() < 1.5: pass\n";
+    let script = format!(
+        "#!/bin/sh\ntext=\"{busy}$3\"\nflags=\"$1 $2\"\nshift 3\nexec {} $flags \"$text\" \"$@\"\n",
+        python().display()
+    );
+    write_program(&slow, &script);
     let arguments = [
+        "--python",
+        slow.to_str().unwrap(),
         "--step-seconds",
         "1",
         "discretize",
@@ -559,6 +567,9 @@ fn a_reading_that_takes_too_long_is_ended() {
         "{said}"
     );
 }
+
+#[cfg(not(unix))]
+fn a_reading_that_takes_too_long_is_ended() {}
 
 fn hostile_files_end_in_a_message() {
     let with = |statements: String| {
