@@ -1,5 +1,6 @@
 //! The field of all coils at their rated currents in the upright plane of an array's section.
 
+use crate::field::steel::clearance::Clearance;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -228,11 +229,11 @@ fn add_steel(
     let parts = Components::All;
     for (step, numbers) in groups {
         let places: Vec<[f64; 3]> = numbers.iter().map(|number| places_m[*number]).collect();
-        let lowest_m = f64::NEG_INFINITY;
         let distance_m = NEAREST * radius_m * f64::from(step).exp2();
+        let clearance = Clearance::above(f64::NEG_INFINITY, distance_m);
         let total = match state {
-            Some(state) => Some(state.field(scene, lowest_m, distance_m)),
-            None => TotalField::linear(scene, solved, &driven, [lowest_m, distance_m]),
+            Some(state) => Some(state.field(scene, clearance)),
+            None => TotalField::linear(scene, solved, &driven, clearance),
         };
         let added = total.map_or_else(Vec::new, |total| total.at(&places, parts));
         let field_parts = added.chunks_exact(places.len()).skip(parts.count() - 3);

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::evaluation_sample::{Evaluation, Sample, compared, sharper};
-use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
+use super::steel::{EVALUATION_SHARE, Solved, clearance};
 use super::{AIR_SHARE, Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
@@ -532,7 +532,7 @@ fn widest(grid: &Grid, magnet: &MagnetMean) -> Grid {
 }
 
 /// Nodes of a grid's lowest plane: where it comes closest to the coils.
-pub(crate) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
+fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
     let z_m = grid.z_m.first().copied().unwrap_or(0.0);
     grid.y_m
         .iter()
@@ -545,15 +545,18 @@ pub(crate) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
 /// # Errors
 /// The first such node.
 pub(crate) fn check_nodes(scene: &Scene, grid: &Grid, magnet: &MagnetMean) -> Result<(), RunError> {
-    clearance_m(scene, &nearest_to_steel(scene, grid), magnet.reach_m).map(|_| ())
+    clearance(scene, &nearest_to_steel(scene, grid), magnet.reach_m).map(|_| ())
 }
 
-/// The nodes that may be the nearest to steel.
-fn nearest_to_steel(scene: &Scene, grid: &Grid) -> Vec<[f64; 3]> {
-    match &scene.iron {
-        // It may be beside or above any node.
-        Some(_) => every_node(grid),
-        None => lowest_plane(grid),
+/// The nodes that may be the nearest to steel, and those that bound the heights of nodes beside it.
+pub(crate) fn nearest_to_steel(scene: &Scene, grid: &Grid) -> Vec<[f64; 3]> {
+    let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
+    let beside = grid.z_m.first().is_some_and(|z_m| *z_m < top_m);
+    // Iron may be beside or above any node.
+    if scene.iron.is_some() || beside {
+        every_node(grid)
+    } else {
+        lowest_plane(grid)
     }
 }
 

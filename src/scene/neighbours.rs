@@ -1,5 +1,6 @@
 //! The coils of an array among their neighbours: inductances, and the steel at the rated currents.
 
+use crate::field::steel::clearance::Clearance;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -336,7 +337,7 @@ fn working_point_summary(
     let lowest_m = scene.design.target_height_m;
     let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
     let total = point
-        .field(scene, lowest_m, lowest_m - top_m)
+        .field(scene, Clearance::above(lowest_m, lowest_m - top_m))
         .at(&places, Components::Gz);
     let sum = |steel: &[f64]| -> Vec<f64> { air.iter().zip(steel).map(|(a, s)| a + s).collect() };
     let flux_linkage_wb = air_inductance_h

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::field::steel::array_steel::{ArraySteel, SteelField};
+use crate::field::steel::clearance::Clearance;
 
 /// Clearances are rounded down to powers of two to one over this: places of one object, lifted, beside
 /// each other or fewer of them share what is prepared, whose cost grows with the clearance's inverse square.
@@ -13,7 +14,7 @@ const HELD: usize = 2;
 const MOST_NUMBERS: usize = 40_000_000;
 
 /// Clearances and tolerance that a field is prepared for, to the bit.
-type Key = [u64; 3];
+type Key = [u64; 4];
 
 /// A field by what it was prepared for.
 type Prepared = (Key, Arc<SteelField>);
@@ -23,24 +24,22 @@ type Prepared = (Key, Arc<SteelField>);
 pub(super) struct PreparedField(Arc<Mutex<Vec<Prepared>>>);
 
 impl PreparedField {
-    /// The field of `steel`, whose cores end at `top_m`, at places no lower than `lowest_m` and no closer
-    /// to a core than `distance_m`, to `tolerance`; `None` without steel. It depends on these alone, not on
-    /// what was prepared before.
+    /// The field of `steel`, whose cores end at `top_m`, at places with `clearance`, to `tolerance`; `None`
+    /// without steel. It depends on these alone, not on what was prepared before.
     pub(super) fn of(
         &self,
         steel: &dyn ArraySteel,
         top_m: f64,
-        [lowest_m, distance_m]: [f64; 2],
+        clearance: Clearance,
         tolerance: f64,
     ) -> Option<Arc<SteelField>> {
-        let above_m = lowest_m - top_m;
-        let lowest_m = if above_m > 0.0 {
-            top_m + rounded_down(above_m)
-        } else {
-            lowest_m
-        };
-        let distance_m = rounded_down(distance_m);
-        let key = [lowest_m, distance_m, tolerance].map(f64::to_bits);
+        let clearance = rounded(clearance, top_m);
+        let Clearance {
+            lowest_m,
+            highest_m,
+            distance_m,
+        } = clearance;
+        let key = [lowest_m, highest_m, distance_m, tolerance].map(f64::to_bits);
         let held = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         {
             let mut held = held();
@@ -50,7 +49,7 @@ impl PreparedField {
                 return Some(Arc::clone(&held[0].1));
             }
         }
-        let field = Arc::new(steel.field(lowest_m, distance_m, tolerance)?);
+        let field = Arc::new(steel.field(clearance, tolerance)?);
         if field
             .coupled()
             .is_none_or(|sources| sources.size() <= MOST_NUMBERS)
@@ -60,6 +59,22 @@ impl PreparedField {
             held.insert(0, (key, Arc::clone(&field)));
         }
         Some(field)
+    }
+}
+
+/// Bounds of the same places or more, over steel that ends at `top_m`.
+fn rounded(clearance: Clearance, top_m: f64) -> Clearance {
+    let above_m = clearance.lowest_m - top_m;
+    let distance_m = rounded_down(clearance.distance_m);
+    if above_m > 0.0 {
+        Clearance::above(top_m + rounded_down(above_m), distance_m)
+    } else if clearance.highest_m >= top_m {
+        Clearance::above(clearance.lowest_m, distance_m)
+    } else {
+        Clearance {
+            distance_m,
+            ..clearance
+        }
     }
 }
 

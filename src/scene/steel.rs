@@ -1,5 +1,6 @@
 //! The solved steel of a scene, and the field it adds.
 
+use crate::field::steel::clearance::Clearance;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -326,48 +327,52 @@ impl Solved {
         if !self.has_steel() {
             return Ok(None);
         }
-        let (lowest_m, distance_m) = clearance_m(scene, points_m, reach_m)?;
-        Ok(self.sources_at(scene, [lowest_m, distance_m], amplification))
+        let clearance = clearance(scene, points_m, reach_m)?;
+        Ok(self.sources_at(scene, clearance, amplification))
     }
 
-    /// The steel's field at places no lower and no closer to a core than `clearances_m`, whose errors
-    /// may grow by `amplification`; `None` without steel.
+    /// The steel's field at places with `clearance`, whose errors may grow by `amplification`; `None` without steel.
     #[must_use]
     pub fn sources_at(
         &self,
         scene: &Scene,
-        clearances_m: [f64; 2],
+        clearance: Clearance,
         amplification: f64,
     ) -> Option<Arc<SteelField>> {
         let (top_m, _) = scene.steel_extent_m()?;
         let tolerance = EVALUATION_SHARE * self.tolerance / amplification;
         let prepared = &self.prepared;
-        prepared.of(self.steel(), top_m, clearances_m, tolerance)
+        prepared.of(self.steel(), top_m, clearance, tolerance)
     }
 }
 
-/// How low places within `reach_m` of `points_m` go, and how close to any steel: at most a core's
-/// length, beyond which rings need be no finer; m.
+/// How low and high places within `reach_m` of `points_m` go, and how close to any steel: at most a core's
+/// length, beyond which rings need be no finer.
 ///
 /// # Errors
 /// A point on the steel's surface or hardly off it.
-pub(crate) fn clearance_m(
+pub(crate) fn clearance(
     scene: &Scene,
     points_m: &[[f64; 3]],
     reach_m: f64,
-) -> Result<(f64, f64), RunError> {
+) -> Result<Clearance, RunError> {
     let (top_m, far_m) = scene.steel_extent_m().unwrap_or_default();
-    let (mut lowest_m, mut distance_m) = (f64::INFINITY, f64::INFINITY);
+    let mut clearance = Clearance {
+        lowest_m: f64::INFINITY,
+        highest_m: f64::NEG_INFINITY,
+        distance_m: far_m,
+    };
     for (number, [x, y, z]) in points_m.iter().enumerate() {
-        lowest_m = lowest_m.min(*z);
+        clearance.lowest_m = clearance.lowest_m.min(*z);
+        clearance.highest_m = clearance.highest_m.max(*z);
         // Seen from farther than its length a core needs no finer rings.
         if *z > top_m + far_m {
             continue;
         }
         let distance = clearance_of_m(scene, number + 1, [*x, *y, *z], reach_m)?;
-        distance_m = distance_m.min(distance);
+        clearance.distance_m = clearance.distance_m.min(distance);
     }
-    Ok((lowest_m - reach_m, distance_m.min(far_m) - reach_m))
+    Ok(clearance.within(reach_m))
 }
 
 /// Distance of point `number` from the nearest steel, at most a core's length, m.

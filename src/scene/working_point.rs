@@ -2,14 +2,15 @@
 
 use super::at_current::{self, no_state};
 use super::core_material::{Material, SceneCore};
-use super::maps::lowest_plane;
-use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
+use super::maps::nearest_to_steel;
+use super::steel::{EVALUATION_SHARE, Solved, clearance};
 use super::{MAGNET_SHARE, Scene, coupled, upward_n};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::field::components::Components;
 use crate::field::steel::array_steel::{ALONG_CURVE, SteelField};
 use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::clearance::Clearance;
 use crate::field::steel::core_flux_density::{CoreField, peak_depth_m};
 use crate::field::steel::equivalent_dipoles::ArraySources;
 use crate::field::steel::saturated::Convergence;
@@ -195,14 +196,13 @@ impl WorkingPoint {
         }
     }
 
-    /// The steel's total field for points no closer than `distance_m` to any core and no lower
-    /// than `lowest_m`.
+    /// The steel's total field for points with `clearance`.
     #[must_use]
-    pub fn field(&self, scene: &Scene, lowest_m: f64, distance_m: f64) -> TotalField {
+    pub fn field(&self, scene: &Scene, clearance: Clearance) -> TotalField {
         let tolerance = EVALUATION_SHARE * self.tolerance;
         let parts = match &self.cores {
             Cores::Coupled(array) => {
-                let sources = ArraySources::of_saturated(array, lowest_m, distance_m, tolerance);
+                let sources = ArraySources::of_saturated(array, clearance, tolerance);
                 vec![(1.0, [0.0, 0.0], SteelField::Coupled(sources))]
             }
             Cores::Alone(states) => states
@@ -262,8 +262,8 @@ impl WorkingPoint {
         // The maps include the gains.
         let mut whole = sum_of_coils(&pick(windings), &self.currents_a);
         if scene.core.is_some() {
-            let (lowest_m, distance_m) = clearance_m(scene, &lowest_plane(grid), 0.0)?;
-            let steel = self.field(scene, lowest_m, distance_m);
+            let clearance = clearance(scene, &nearest_to_steel(scene, grid), 0.0)?;
+            let steel = self.field(scene, clearance);
             let sampled = SampledField::new(&steel, grid, components, tolerance, 1, progress)?;
             let all = PlacedCoil {
                 number: 0,
@@ -300,8 +300,7 @@ impl WorkingPoint {
         if scene.core.is_none() {
             return Ok(total);
         }
-        let (lowest_m, distance_m) = clearance_m(scene, points_m, rule.reach_m())?;
-        let field = self.field(scene, lowest_m, distance_m);
+        let field = self.field(scene, clearance(scene, points_m, rule.reach_m())?);
         let parts = if rule.is_upright() {
             Components::Gz
         } else {
@@ -391,17 +390,17 @@ pub struct TotalField {
 }
 
 impl TotalField {
-    /// Of steel that is linear at these currents, gains included, for places no lower and no closer to a
-    /// core than `clearances_m`; `None` without steel.
+    /// Of steel that is linear at these currents, gains included, for places with `clearance`; `None`
+    /// without steel.
     #[must_use]
     pub fn linear(
         scene: &Scene,
         solved: &Solved,
         currents_a: &[f64],
-        clearances_m: [f64; 2],
+        clearance: Clearance,
     ) -> Option<Self> {
         let (top_m, _) = scene.steel_extent_m()?;
-        let sources = solved.sources_at(scene, clearances_m, 1.0)?;
+        let sources = solved.sources_at(scene, clearance, 1.0)?;
         let parts = match sources.coupled() {
             Some(all) => {
                 let driven = SteelField::Coupled(all.at_currents(currents_a));

@@ -9,6 +9,7 @@ use fluxform_field::iron::bodies::{
 use fluxform_field::iron::peaks::{Depths, PeakSearch};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::winding::Winding;
@@ -86,7 +87,10 @@ fn one_core_is_as_the_axisymmetric_solver_has_it_at_any_permeability() {
         let array = IronArray::at_resolution(one, &iron, 1e-4, tier).unwrap();
         let axial = CoredCoil::new(&WINDING, SHAPE, mu_r, 1e-6, 0.03).unwrap();
         let own = axial.core.field(0.0, 0.03).dbz_dz;
-        let found = steel_gz(&array.sources(0.03, 0.03, 1e-6), [0.0, 0.0, 0.03])[0];
+        let found = steel_gz(
+            &array.sources(Clearance::above(0.03, 0.03), 1e-6),
+            [0.0, 0.0, 0.03],
+        )[0];
         assert!((found / own - 1.0).abs() < 2e-4, "{mu_r}: {found} {own}");
         let added = array.added_inductance_h[(0, 0)] / axial.added_inductance_h;
         assert!((added - 1.0).abs() < 2e-4, "{mu_r}: {added}");
@@ -111,8 +115,8 @@ fn the_estimate_covers_the_difference_from_coupled_cores() {
             "{peak:?} {exact:?}"
         );
     }
-    let exact = ArraySources::of_array(&known, 0.02, 0.02, 1e-7);
-    let sources = array.sources(0.02, 0.02, 1e-6);
+    let exact = ArraySources::of_array(&known, Clearance::above(0.02, 0.02), 1e-7);
+    let sources = array.sources(Clearance::above(0.02, 0.02), 1e-6);
     let size = WINDING.field(0.0, 0.02).unwrap().gradient_norm();
     for place in [[-0.03, 0.0, 0.02], [0.03, 0.0, 0.02], [0.01, 0.013, 0.02]] {
         for (a, b) in steel_gz(&sources, place)
@@ -148,7 +152,7 @@ fn a_round_plate_below_a_coil_is_an_axisymmetric_body() {
     let axial = CoredCoil::new(&WINDING, shape, 500.0, 1e-5, 0.02).unwrap();
     let place = [0.013, 0.021, 0.02];
     let own = axial.core.field(0.013_f64.hypot(0.021), 0.02).dbz_dz;
-    let found = steel_gz(&array.sources(0.02, 0.02, 1e-6), place)[0];
+    let found = steel_gz(&array.sources(Clearance::above(0.02, 0.02), 1e-6), place)[0];
     // That solver was made for cores: it states an error of 2e-4 of the whole.
     let claimed = axial.relative_error;
     let size = WINDING.field(0.0, 0.02).unwrap().gradient_norm();
@@ -176,7 +180,7 @@ fn a_large_thick_plate_gives_the_image_of_the_coil() {
     // The winding from -4 to 0 mm about the plane at -10 mm: from -20 to -16 mm.
     let (r, z) = (0.003, 0.009);
     let image = 6.0 / 8.0 * coil.field(r, z + 0.016).unwrap().dbz_dz;
-    let found = steel_gz(&array.sources(z, z, 1e-6), [r, 0.0, z])[0];
+    let found = steel_gz(&array.sources(Clearance::above(z, z), 1e-6), [r, 0.0, z])[0];
     assert!((found / image - 1.0).abs() < 5e-3, "{found} {image}");
 }
 
@@ -194,7 +198,7 @@ fn a_plate_joins_the_cores_and_closes_the_flux() {
     let nine = coils(&positions_m, 999.0);
     let iron = Iron::new(nine, Some(&joined)).unwrap();
     let array = IronArray::at_resolution(nine, &iron, 1e-3, 1).unwrap();
-    let sources = array.sources(0.03, 0.03, 1e-5);
+    let sources = array.sources(Clearance::above(0.03, 0.03), 1e-5);
     let oracle = oracle("plate");
     let elements = &oracle["meshes"]["best"];
     let added = &array.added_inductance_h;
@@ -255,7 +259,7 @@ fn a_core_on_a_round_plate_is_as_axisymmetric_elements_have_it() {
     let one = coils(&[[0.0, 0.0]], 999.0);
     let iron = Iron::new(one, Some(&round)).unwrap();
     let array = IronArray::at_resolution(one, &iron, 1e-4, 2).unwrap();
-    let sources = array.sources(0.03, 0.05, 1e-6);
+    let sources = array.sources(Clearance::above(0.03, 0.05), 1e-6);
     let heights = case["z_m"].as_array().expect("heights");
     assert_eq!(heights.len(), 2);
     for (z, expected) in heights

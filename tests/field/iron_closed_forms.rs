@@ -12,6 +12,7 @@ use fluxform_field::iron::bodies::{Coils, Iron, Outline, Plate, cuboid, tube};
 use fluxform_field::iron::face::{Face, Point};
 use fluxform_field::iron::mesh_body::mesh;
 use fluxform_field::iron::uniform::InUniformField;
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::winding::Winding;
 use fluxform_testing::boxes::block;
 
@@ -136,7 +137,7 @@ fn wide_plate(tier: usize) -> Outcome {
     let array = IronArray::at_resolution(alone, &iron, 1e-6, tier).unwrap();
     let (r, z) = (0.003, 0.009);
     let mut found = [0.0];
-    let sources = array.sources(z, z, 1e-8);
+    let sources = array.sources(Clearance::above(z, z), 1e-8);
     sources.sample(&[[r, 0.0, z]], Components::Gz, &mut found);
     let k = (mu - 1.0) / (mu + 1.0);
     let image = |shift_m: f64| {

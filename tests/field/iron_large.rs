@@ -4,6 +4,7 @@ use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::components::Components;
 use fluxform_field::iron::array::IronArray;
 use fluxform_field::iron::bodies::{Body, Coils, Iron, Outline, Piece, Plate, Solid, UPRIGHT};
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
 
@@ -43,7 +44,7 @@ fn error(array: &IronArray, gap_m: f64) -> f64 {
         [0.02, 0.0, 0.01],
         [0.0, 0.03, 0.04],
     ];
-    let sources = array.sources(0.01, 0.01, 1e-7);
+    let sources = array.sources(Clearance::above(0.01, 0.01), 1e-7);
     let mut steel = [0.0; 4];
     sources.sample(&places, Components::Gz, &mut steel);
     let of_place = |([x, y, z], steel): ([f64; 3], f64)| {

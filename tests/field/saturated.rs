@@ -8,6 +8,7 @@ use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::cored_coil::Excitation;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::generatrix::{Generatrix, Resolution};
@@ -112,7 +113,7 @@ fn slopes(sources: &ArraySources, points: &[[f64; 3]], currents_a: &[f64]) -> Ve
 }
 
 fn of_saturated(array: &SaturatedArray, points: &[[f64; 3]]) -> Vec<f64> {
-    let sources = ArraySources::of_saturated(array, LOWEST_M, LOWEST_M, 1e-7);
+    let sources = ArraySources::of_saturated(array, Clearance::above(LOWEST_M, LOWEST_M), 1e-7);
     slopes(&sources, points, &[1.0])
 }
 
@@ -168,7 +169,7 @@ fn a_constant_law_is_the_linear_array() {
         let linear = CoupledArray::at_resolution(&WINDING, SHAPE, relative, &SCATTER, &resolution)
             .expect("a good design");
         let points = points(&SCATTER);
-        let sources = ArraySources::of_array(&linear, LOWEST_M, LOWEST_M, 1e-7);
+        let sources = ArraySources::of_array(&linear, Clearance::above(LOWEST_M, LOWEST_M), 1e-7);
         let gradient = off(
             &of_saturated(&ours, &points),
             &slopes(&sources, &points, &MIXED_A),

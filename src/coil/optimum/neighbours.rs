@@ -7,6 +7,7 @@
 use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::winding::Winding;
@@ -83,7 +84,8 @@ impl Neighbours {
         )
         .ok()?;
         // Above every core: their heights alone say how far the dipoles are.
-        let sources = ArraySources::of_array(&array, lowest_m, 0.0, 0.1 * TOLERANCE);
+        let sources =
+            ArraySources::of_array(&array, Clearance::above(lowest_m, 0.0), 0.1 * TOLERANCE);
         let [x, y] = self.positions_m[self.drive];
         let points: Vec<[f64; 3]> = dipoles.iter().map(|d| [x, y, d.0]).collect();
         let mut steel = vec![0.0; self.positions_m.len() * points.len()];

@@ -4,6 +4,7 @@ pub(crate) mod command;
 pub mod scan;
 
 use crate::field::components::Components;
+use crate::field::steel::clearance::Clearance;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -234,19 +235,19 @@ fn force_error(
 /// Rows that are evaluated alike, whatever other rows there are.
 struct Group {
     rows: Vec<usize>,
-    /// Height that no row's point is below, for the steel and for the magnet.
-    lowest_m: f64,
+    /// Of every row's point.
+    clearance: Clearance,
+    /// Height that no row's point is below, for the magnet.
     magnet_lowest_m: f64,
-    /// Distance that no row's point is closer to a core than.
-    distance_m: f64,
 }
 
 /// The points by powers of two of their distance from the nearest core and of the gap between
-/// array and magnet.
-fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Group>, RunError> {
+/// array and magnet; beside the array, where they are closer to a core than its radius, by heights of a radius.
+fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 3], Group>, RunError> {
     let core = scene.core.as_ref();
     let top_m = scene.sources_top_m();
-    let unit_m = CLOSEST * core.map_or(scene.winding.inner_radius_m, |core| core.shape.radius_m);
+    let radius_m = core.map_or(scene.winding.inner_radius_m, |core| core.shape.radius_m);
+    let unit_m = CLOSEST * radius_m;
     let depth_m = scene.magnet_depth_m();
     let step = |length_m: f64| (length_m / unit_m).log2().floor();
     let mut groups = BTreeMap::new();
@@ -260,12 +261,24 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Gro
         let gap_m = point[2] - top_m - depth_m;
         let up = (gap_m > 0.0).then(|| step(gap_m));
         let above_m = up.map(|up| top_m + depth_m + unit_m * up.exp2());
-        let key = [near as i32, up.map_or(i32::MIN, |up| up as i32)];
+        let distance_m = unit_m * near.exp2();
+        let down = (above_m.is_none() && distance_m < radius_m)
+            .then(|| ((top_m - point[2]) / radius_m).floor());
+        let [lowest_m, highest_m] = match (above_m, down) {
+            (Some(above_m), _) => [above_m, f64::INFINITY],
+            (None, Some(down)) => [down + 1.0, down].map(|radii| top_m - radii * radius_m),
+            (None, None) => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        let of = |step: Option<f64>| step.map_or(i32::MIN, |step| step as i32);
+        let key = [near as i32, of(up), of(down)];
         let group = groups.entry(key).or_insert_with(|| Group {
             rows: Vec::new(),
-            lowest_m: above_m.unwrap_or(f64::NEG_INFINITY),
+            clearance: Clearance {
+                lowest_m,
+                highest_m,
+                distance_m,
+            },
             magnet_lowest_m: above_m.unwrap_or(top_m),
-            distance_m: unit_m * near.exp2(),
         });
         group.rows.push(row);
     }
@@ -279,7 +292,7 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Gro
 /// A magnet that touches the array, or is too close for the tolerance, with the number of its point.
 fn with_rules(
     scene: &Scene,
-    groups: BTreeMap<[i32; 2], Group>,
+    groups: BTreeMap<[i32; 3], Group>,
     points_m: &[[f64; 3]],
     finest: f64,
 ) -> Result<Vec<(Group, Option<MagnetRule>)>, RunError> {
@@ -347,11 +360,7 @@ impl<'a> FieldAt<'a> {
         }
         Ok(Self {
             scene,
-            sources: solved.sources_at(
-                scene,
-                [group.lowest_m - reach_m, group.distance_m - reach_m],
-                amplification,
-            ),
+            sources: solved.sources_at(scene, group.clearance.within(reach_m), amplification),
         })
     }
 

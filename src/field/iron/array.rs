@@ -1,5 +1,6 @@
 //! Windings among steel of any shape, solved.
 
+use crate::steel::clearance::Clearance;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -273,7 +274,7 @@ impl IronArray {
                 .flat_map(|[x, y]| near.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
                 .collect();
             let values = |array: &Self| {
-                let sources = array.sources(z_m, z_m - top_m, 0.02 * tolerance);
+                let sources = array.sources(Clearance::above(z_m, z_m - top_m), 0.02 * tolerance);
                 let mut out = vec![0.0; self.positions_m.len() * parts.count() * points.len()];
                 sources.sample(&points, parts, &mut out);
                 out
@@ -315,14 +316,13 @@ impl IronArray {
         self.surface.size()
     }
 
-    /// Dipoles for places no lower than `lowest_m` and no closer to the steel than `distance_m`.
+    /// Dipoles for places with `clearance`.
     #[must_use]
-    pub fn sources(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> ArraySources {
+    pub fn sources(&self, clearance: Clearance, tolerance: f64) -> ArraySources {
         let drives = self.positions_m.len();
-        let distance = |z_m: f64| distance_m.max(lowest_m - z_m);
         let mut all = (Vec::new(), Vec::new());
         for (image, layers) in self.layers.iter().enumerate() {
-            let (places, moments) = self.surface.dipoles(drives, layers, &distance, tolerance);
+            let (places, moments) = self.surface.dipoles(drives, layers, clearance, tolerance);
             let [sx, sy] = self.images[image];
             let [cx, cy] = self.planes_m;
             all.0

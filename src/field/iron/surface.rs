@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::face::{Face, Node, Panel, Point, Resolution};
 use super::near_windings::Windings;
 use super::parts::{Parts, Place, coordinate_rounding_m};
+use crate::steel::clearance::Clearance;
 use crate::steel::passive::reaction::Induced;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
@@ -214,21 +215,21 @@ impl Surface {
         }
     }
 
-    /// Dipoles that stand for the layers `values` (`[node][drive]`) at places that are `distance_m(z)` or more from
-    /// whatever lies at the height z: their places with unit normals, and their moments [dipole, drive].
+    /// Dipoles that stand for the layers `values` (`[node][drive]`) at places with `clearance`: their places with
+    /// unit normals, and their moments [dipole, drive].
     #[must_use]
     pub fn dipoles(
         &self,
         drives: usize,
         values: &[f64],
-        distance_m: &(impl Fn(f64) -> f64 + Sync),
+        clearance: Clearance,
         tolerance: f64,
     ) -> (Vec<[f64; 6]>, Vec<f64>) {
         let parts: Vec<_> = (self.whole_faces().into_par_iter())
             .map(|(whole, panels)| {
                 let mut out = (Vec::new(), Vec::new());
                 self.add_dipoles(
-                    &whole, panels, drives, values, distance_m, tolerance, &mut out,
+                    &whole, panels, drives, values, clearance, tolerance, &mut out,
                 );
                 out
             })
@@ -248,13 +249,14 @@ impl Surface {
         panels: Range<usize>,
         drives: usize,
         values: &[f64],
-        distance_m: &impl Fn(f64) -> f64,
+        clearance: Clearance,
         tolerance: f64,
         out: &mut (Vec<[f64; 6]>, Vec<f64>),
     ) {
         fluxform_base::progress::poll();
         let face = &self.faces[part.face];
-        let distance = distance_m(part.centre_m[2] + part.radius_m);
+        let [low_m, high_m] = [-part.radius_m, part.radius_m].map(|by| part.centre_m[2] + by);
+        let distance = clearance.from_heights_m(low_m, high_m);
         if part.sides_m[0].max(part.sides_m[1]) > DIPOLE_PANEL * distance {
             for half in part.halves(face) {
                 self.add_dipoles(
@@ -262,7 +264,7 @@ impl Surface {
                     panels.clone(),
                     drives,
                     values,
-                    distance_m,
+                    clearance,
                     tolerance,
                     out,
                 );

@@ -12,6 +12,7 @@
 //! A few cores exchange potentials on their whole grids; many only what passes between them (see
 //! `reduced_coupling`).
 
+use super::clearance::Clearance;
 use serde::{Deserialize, Serialize};
 
 use nalgebra::{DMatrix, DVector};
@@ -326,26 +327,20 @@ impl CoupledArray {
 }
 
 impl ArraySources {
-    /// Dipoles for points no closer than `distance_m` to any core and no lower than `lowest_m`,
-    /// to a relative error `tolerance`.
+    /// Dipoles for points with `clearance`, to a relative error `tolerance`.
     #[must_use]
-    pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
-        Self::of_coils(array, (lowest_m, distance_m, tolerance), false)
+    pub fn of_array(array: &CoupledArray, clearance: Clearance, tolerance: f64) -> Self {
+        Self::of_coils(array, (clearance, tolerance), false)
     }
 
     /// The same for many points: as few dipoles as a comparison with those of
     /// [`ArraySources::of_array`] allows, which costs about what these cost for a hundred points.
     #[must_use]
-    pub fn for_many_points(
-        array: &CoupledArray,
-        lowest_m: f64,
-        distance_m: f64,
-        tolerance: f64,
-    ) -> Self {
-        Self::of_coils(array, (lowest_m, distance_m, tolerance), true)
+    pub fn for_many_points(array: &CoupledArray, clearance: Clearance, tolerance: f64) -> Self {
+        Self::of_coils(array, (clearance, tolerance), true)
     }
 
-    pub(super) fn of_coils(array: &CoupledArray, near: (f64, f64, f64), many: bool) -> Self {
+    pub(super) fn of_coils(array: &CoupledArray, near: (Clearance, f64), many: bool) -> Self {
         let drives: Vec<usize> = (0..array.positions_m.len()).collect();
         Self::of_drives(array, &drives, near, many).driven_by_coils(&array.positions_m)
     }
@@ -354,7 +349,7 @@ impl ArraySources {
     pub(super) fn of_drives(
         array: &CoupledArray,
         drives: &[usize],
-        (lowest_m, distance_m, tolerance): (f64, f64, f64),
+        (clearance, tolerance): (Clearance, f64),
         many: bool,
     ) -> Self {
         Self::new(
@@ -362,8 +357,7 @@ impl ArraySources {
             &array.positions_m,
             &array.core_layers(drives),
             Near {
-                lowest_m,
-                distance_m,
+                clearance,
                 tolerance,
                 many,
                 winding: &array.winding,

@@ -5,19 +5,21 @@
 //! places about them. The others are then solved once, by the resolution that does, in blocks that depend
 //! on the array alone: whoever solves a block, its numbers are the same to the bit.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::CoreShape;
 use super::array::{CoupledArray, MOST_WHOLE, closest_m, grids_at_once, representatives};
 use super::array_resolution::{ArrayResolution, MOST_MODES};
+use super::clearance::Clearance;
 use super::cored_coil::Excitation;
 use super::equivalent_dipoles::{ArraySources, spread_over};
 use super::generatrix::Resolution;
 pub use super::reduced_coupling::SolvedBlock;
 use super::reduced_coupling::{BLOCK, ReducedCoupling};
 use super::symmetry::motions;
+use super::{CLOSEST, CoreShape};
 use crate::components::Components;
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -28,10 +30,10 @@ const MOST_REFINEMENTS: usize = 4;
 pub(super) const FIRST_AIM: f64 = 2.0;
 /// What a refinement makes of the aim.
 pub(super) const FINER: f64 = 0.3;
-/// Distance above the cores, in radii, below which no error is estimated.
-const CLOSEST: f64 = 0.1;
-/// Heights above the cores, in radii, below which the outline is resolved for places close to it.
+/// Heights above the cores, in radii, below which the outline is resolved for places close to it, and
+/// below which places are so close that drives are chosen by which resolutions are compared.
 const NEAR: f64 = 0.5;
+const CLOSE: f64 = 0.1;
 /// Modes that each refinement adds where places close to the cores are requested.
 const MODES_NEAR: usize = 2;
 /// Drives of many coils by which two resolutions are compared, at most, and the distance of the coils
@@ -42,6 +44,16 @@ const BESIDE: f64 = 1.6;
 const MOST_AT_ONCE: usize = 12;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+/// Angles beside a core at which they are compared, and the depths there, of that to which places go.
+const ANGLES_BESIDE: usize = 8;
+const DEPTHS_BESIDE: [f64; 2] = [0.1, 0.5];
+
+/// Places about an axis at which two resolutions are compared.
+struct Places {
+    clearance: Clearance,
+    heights_m: Vec<f64>,
+    offsets_m: Vec<[f64; 2]>,
+}
 
 /// An array that is to be solved to a tolerance.
 ///
@@ -134,18 +146,36 @@ impl CoupledArray {
         request.solve(&NoCache)
     }
 
-    /// The larger difference of gradients and inductances from those of `other` for `drives`, at places
-    /// beside the axes `about` from `lowest_m` up, evaluated well within `tolerance`.
+    /// The larger difference of gradients and inductances from those of `other` for `drives`, at
+    /// `places` about the axes `about`, evaluated well within `tolerance`.
     fn difference(
         &self,
         other: &Self,
         (drives, about): (&[usize], &[[f64; 2]]),
-        lowest_m: f64,
+        places: &[Places],
         tolerance: f64,
     ) -> Result<f64, OnEdge> {
-        let shape = self.response.outline.shape;
-        let distance_m = lowest_m - shape.top_m;
-        let near = (lowest_m, distance_m, 0.05 * tolerance);
+        let mut worst = 0.0_f64;
+        for places in places {
+            worst =
+                worst.max(self.gradient_difference(other, (drives, about), places, tolerance)?);
+        }
+        let added = &self.added_inductance_h;
+        let size = added
+            .amax()
+            .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
+        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+    }
+
+    /// The largest difference of gradients at `places`, relative to the largest at their height.
+    fn gradient_difference(
+        &self,
+        other: &Self,
+        (drives, about): (&[usize], &[[f64; 2]]),
+        places: &Places,
+        tolerance: f64,
+    ) -> Result<f64, OnEdge> {
+        let near = (places.clearance, 0.05 * tolerance);
         let sources = |array: &Self| {
             if drives.len() == array.positions_m.len() {
                 ArraySources::of_coils(array, near, false)
@@ -156,18 +186,21 @@ impl CoupledArray {
         let (fine, coarse) = rayon::join(|| sources(self), || sources(other));
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
-        for height in [0.0, 1.0, 4.0] {
-            let z_m = lowest_m + height * shape.radius_m;
-            let reach = self.winding.outer_radius_m;
+        for z_m in &places.heights_m {
             let points: Vec<[f64; 3]> = (about.iter())
-                .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
+                .flat_map(|[x, y]| {
+                    places
+                        .offsets_m
+                        .iter()
+                        .map(move |[dx, dy]| [x + dx, y + dy, *z_m])
+                })
                 .collect();
             let mut values = vec![0.0; drives.len() * parts.count() * points.len()];
             let mut others = values.clone();
             fine.sample(&points, parts, &mut values);
             coarse.sample(&points, parts, &mut others);
             // The winding's own gradient adds to the largest, which lies above it.
-            let air = self.winding.field(0.0, z_m)?.gradient_norm();
+            let air = self.winding.field(0.0, *z_m)?.gradient_norm();
             let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
             let difference = values
                 .iter()
@@ -175,11 +208,7 @@ impl CoupledArray {
                 .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             worst = worst.max(difference / size);
         }
-        let added = &self.added_inductance_h;
-        let size = added
-            .amax()
-            .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
-        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+        Ok(worst)
     }
 }
 
@@ -342,10 +371,46 @@ impl<'a> ArrayRequest<'a> {
         [coarse, fine]
     }
 
-    /// The least height for which an error is estimated, m.
+    /// The least height above the array for which an error is estimated, m.
     fn lowest_m(&self) -> f64 {
         let above_m = self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m;
         self.lowest_m.max(above_m)
+    }
+
+    /// Where two resolutions are compared: above the array, and beside the cores where places go as low.
+    fn places(&self) -> Vec<Places> {
+        let (shape, lowest_m) = (self.shape, self.lowest_m());
+        let reach_m = self.winding.outer_radius_m;
+        let mut places = vec![Places {
+            clearance: Clearance::above(lowest_m, lowest_m - shape.top_m),
+            heights_m: [0.0, 1.0, 4.0]
+                .map(|radii| lowest_m + radii * shape.radius_m)
+                .to_vec(),
+            offsets_m: PLACES.map(|offset| offset.map(|by| reach_m * by)).to_vec(),
+        }];
+        let end_m = self.lowest_m.max(shape.bottom_m);
+        if end_m < shape.top_m {
+            let distance_m = CLOSEST * shape.radius_m;
+            let offsets_m: Vec<[f64; 2]> = (0..ANGLES_BESIDE)
+                .map(|k| {
+                    let (s, c) = (TAU * k as f64 / ANGLES_BESIDE as f64).sin_cos();
+                    [c, s].map(|by| by * (shape.radius_m + distance_m))
+                })
+                .collect();
+            places.extend(DEPTHS_BESIDE.map(|part| {
+                let z_m = shape.top_m - part * (shape.top_m - end_m);
+                Places {
+                    clearance: Clearance {
+                        lowest_m: z_m,
+                        highest_m: z_m,
+                        distance_m,
+                    },
+                    heights_m: vec![z_m],
+                    offsets_m: offsets_m.clone(),
+                }
+            }));
+        }
+        places
     }
 
     /// The array at the first resolution that does, or that of the least estimated error; of many cores
@@ -373,7 +438,7 @@ impl<'a> ArrayRequest<'a> {
             let (coarse, mut fine) = (coarse?, fine?);
             let compared = (&drives[..], &about[..]);
             let difference =
-                (fine.array).difference(&coarse, compared, self.lowest_m(), self.tolerance)?;
+                (fine.array).difference(&coarse, compared, &self.places(), self.tolerance)?;
             let error = exchange.max(difference);
             fine.array.relative_error = error;
             let better = best.as_ref().is_none_or(|b| error < b.array.relative_error);
@@ -452,12 +517,19 @@ impl<'a> ArrayRequest<'a> {
         )
     }
 
-    /// Drives by which two resolutions are compared, and axes about which: of a few coils all, of many
-    /// those of the first block, and their neighbours.
+    /// Drives by which two resolutions are compared, and axes about which: of a few coils all, but where
+    /// places are close to the cores, of many those of the first block, and their neighbours.
     fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
         let all = self.positions_m;
         let Some(block) = self.drives_of_blocks().into_iter().next() else {
-            return ((0..all.len()).collect(), all.to_vec());
+            // Close places take many dipoles for every drive, and coils that are equivalent tell nothing new.
+            let close_m = self.shape.top_m.max(0.0) + CLOSE * self.shape.radius_m;
+            let drives = if self.lowest_m < close_m {
+                representatives(all.len(), &motions(all))
+            } else {
+                (0..all.len()).collect()
+            };
+            return (drives, all.to_vec());
         };
         let chosen = spread_over(block.len(), MOST_COMPARED);
         let drives: Vec<usize> = chosen.into_iter().map(|k| block[k]).collect();
@@ -509,7 +581,9 @@ mod tests {
         let (array, truth) = (array.unwrap(), truth.unwrap());
         let others: Vec<usize> = blocks[1..].concat();
         let compared = (&others[..], &positions_m[..]);
-        let error = array.difference(&truth, compared, 0.013, 1e-5).unwrap();
+        let error = array
+            .difference(&truth, compared, &coarse.places(), 1e-5)
+            .unwrap();
         assert!(
             error < array.relative_error && array.relative_error < 1e-3,
             "{error:e} {:e}",

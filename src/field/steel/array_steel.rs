@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::array::CoupledArray;
 use super::axial_table::AxialTable;
+use super::clearance::Clearance;
 use super::equivalent_dipoles::ArraySources;
 use super::magnetized::MagnetizedCore;
 use crate::iron::array::IronArray;
@@ -38,9 +39,8 @@ pub trait ArraySteel {
         None
     }
 
-    /// The field that the steel adds at places no lower than `lowest_m` and no closer to a core
-    /// than `distance_m`, to `tolerance`; `None` without steel.
-    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField>;
+    /// The field that the steel adds at places with `clearance`, to `tolerance`; `None` without steel.
+    fn field(&self, clearance: Clearance, tolerance: f64) -> Option<SteelField>;
 
     /// How the error of the solution is known; `None` without steel.
     fn method(&self) -> Option<&'static str>;
@@ -92,7 +92,7 @@ impl ArraySteel for NoSteel {
         Some((field, "elliptic integrals"))
     }
 
-    fn field(&self, _: f64, _: f64, _: f64) -> Option<SteelField> {
+    fn field(&self, _: Clearance, _: f64) -> Option<SteelField> {
         None
     }
 
@@ -139,7 +139,7 @@ impl ArraySteel for AloneCore {
         Some((Box::new(field), method))
     }
 
-    fn field(&self, _: f64, _: f64, tolerance: f64) -> Option<SteelField> {
+    fn field(&self, _: Clearance, tolerance: f64) -> Option<SteelField> {
         Some(SteelField::of_core(self.layer.clone(), tolerance))
     }
 
@@ -161,8 +161,8 @@ impl ArraySteel for CoupledArray {
         self.added_inductance_h[(i, j)]
     }
 
-    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
-        let sources = ArraySources::for_many_points(self, lowest_m, distance_m, tolerance);
+    fn field(&self, clearance: Clearance, tolerance: f64) -> Option<SteelField> {
+        let sources = ArraySources::for_many_points(self, clearance, tolerance);
         Some(SteelField::Coupled(sources))
     }
 
@@ -180,10 +180,8 @@ impl ArraySteel for IronArray {
         self.added_inductance_h[(i, j)]
     }
 
-    fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
-        Some(SteelField::Coupled(
-            self.sources(lowest_m, distance_m, tolerance),
-        ))
+    fn field(&self, clearance: Clearance, tolerance: f64) -> Option<SteelField> {
+        Some(SteelField::Coupled(self.sources(clearance, tolerance)))
     }
 
     fn method(&self) -> Option<&'static str> {

@@ -13,6 +13,7 @@ use std::f64::consts::{PI, TAU};
 use super::CoreShape;
 pub use super::array_sources::ArraySources;
 use super::array_sources::{DipolePlace, Level};
+use super::clearance::Clearance;
 use super::core_layers::CoreLayers;
 use super::generatrix::{Generatrix, Node};
 use super::response::{RingPanel, Rings, ring_panels};
@@ -54,8 +55,7 @@ const MOST_CANCELLATION: f64 = 1e12;
 /// How close points come, and how exact their values are to be.
 #[derive(Clone, Copy)]
 pub(super) struct Near<'a> {
-    pub(super) lowest_m: f64,
-    pub(super) distance_m: f64,
+    pub(super) clearance: Clearance,
     pub(super) tolerance: f64,
     /// Whether places are so many that it pays to find the fewest dipoles for them.
     pub(super) many: bool,
@@ -66,12 +66,21 @@ pub(super) struct Near<'a> {
 impl Near<'_> {
     /// The least distance from a core that counts, m.
     fn floor_m(&self, shape: CoreShape) -> f64 {
-        self.distance_m.max(CLOSEST * shape.radius_m)
+        self.clearance.distance_m.max(CLOSEST * shape.radius_m)
     }
 
     /// Distance of the places from what lies at the height `z_m`, at least, m.
     fn clearance_m(&self, shape: CoreShape, z_m: f64) -> f64 {
-        self.floor_m(shape).max(self.lowest_m - z_m)
+        self.floor_m(shape)
+            .max(self.clearance.from_heights_m(z_m, z_m))
+    }
+
+    /// Length of a ring panel that begins at the height `z_m` and goes down, at most, m.
+    fn panel_m(&self, shape: CoreShape, z_m: f64) -> f64 {
+        // Above the places its lower end is the nearest to them.
+        let above_m = (z_m - self.clearance.highest_m) / (1.0 + PANEL);
+        let below_m = self.clearance.lowest_m - z_m;
+        PANEL * self.floor_m(shape).max(below_m).max(above_m)
     }
 
     /// The gradient that errors at a height are relative to, T/m/A, and the field, T/A.
@@ -197,8 +206,8 @@ impl<'a> DipoleTask<'a> {
         let shape = outline.shape;
         let floor_m = near.floor_m(shape);
         let distance = |z_m: f64| near.clearance_m(shape, z_m);
-        let height_m = (shape.top_m.max(0.0) + floor_m).max(near.lowest_m);
-        let panels = ring_panels(shape, |z| PANEL * distance(z));
+        let height_m = (shape.top_m.max(0.0) + floor_m).max(near.clearance.lowest_m);
+        let panels = ring_panels(shape, |z_m| near.panel_m(shape, z_m));
         // A layer's parts cancel (a constant layer has no field at all), so that an error relative
         // to one ring's field is a larger one relative to the field that is left.
         let parts = parts_of_layer(outline, &panels, largest, distance);
@@ -316,7 +325,12 @@ impl<'a> DipoleTask<'a> {
 
     /// Places as close to a core at the origin as any may be, and some farther ones.
     fn compared_places(&self) -> Vec<[f64; 3]> {
-        let (shape, lowest_m) = (self.outline.shape, self.near.lowest_m);
+        let shape = self.outline.shape;
+        let Clearance {
+            lowest_m,
+            highest_m,
+            ..
+        } = self.near.clearance;
         let floor_m = self.near.floor_m(shape);
         let edge = |part: f64, angle: f64| {
             let (s, c) = angle.sin_cos();
@@ -348,7 +362,14 @@ impl<'a> DipoleTask<'a> {
             .map(|[r_m, z_m]| [*r_m, shape.top_m + floor_m + z_m])
             .collect();
         let about = close.iter().chain(&beside).chain(&farther);
-        let about = about.map(|[r_m, z_m]| [*r_m, z_m.max(lowest_m)]);
+        let about = about.map(|[r_m, z_m]| {
+            if *z_m > highest_m {
+                // Those that would be above are beside the core.
+                [r_m.max(shape.radius_m + floor_m), highest_m]
+            } else {
+                [*r_m, z_m.max(lowest_m)]
+            }
+        });
         let about: Vec<[f64; 2]> = about.collect();
         (0..COMPARED_ANGLES * about.len())
             .map(|k| {
@@ -469,10 +490,8 @@ impl ArraySources {
         let largest = layers.largest_on_nodes(&spread_over(layers.drives(), LARGEST_DRIVES));
         let distances_m = distances_m(shape, positions_m, near);
         let of_level = |distance_m: &f64| {
-            let near = Near {
-                distance_m: *distance_m,
-                ..near
-            };
+            let mut near = near;
+            near.clearance.distance_m = *distance_m;
             let task = DipoleTask::new(outline, layers, &largest, near);
             // A priori every part counts as if it stood alone and its layer were as rough as can be;
             // how much less does is seen by comparison.
@@ -490,7 +509,7 @@ impl ArraySources {
             .filter(|[_, amplitudes]| amplitudes.nrows() < layers.drives());
         let levels = tasks.into_iter().map(|(task, dipoles)| {
             let Dipoles { places, moments } = dipoles;
-            let from_m = task.near.distance_m;
+            let from_m = task.near.clearance.distance_m;
             match &few {
                 Some([patterns, _]) => {
                     Level::new(from_m, places, std::iter::once(moments * patterns))
@@ -523,7 +542,7 @@ fn distances_m(shape: CoreShape, positions_m: &[[f64; 2]], near: Near<'_>) -> Ve
     let growth = (extent_m / floor_m)
         .powf(1.0 / MOST_LEVELS as f64)
         .max(least);
-    let mut distances_m = vec![near.distance_m];
+    let mut distances_m = vec![near.clearance.distance_m];
     let mut next_m = growth * floor_m;
     while next_m < extent_m {
         distances_m.push(next_m);

@@ -10,6 +10,7 @@ pub mod axial_table;
 pub mod bh_check;
 pub mod bh_curve;
 pub mod bore;
+pub mod clearance;
 pub mod condensation;
 pub mod core_flux_density;
 mod core_layers;

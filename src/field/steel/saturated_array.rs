@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use super::CoreShape;
 use super::array::{ArrayResolution, closest_m};
+use super::clearance::Clearance;
 use super::core_layers::CoreLayers;
 use super::cored_coil::Excitation;
 use super::coupling::Coupling;
@@ -355,9 +356,8 @@ impl SaturatedArray {
         if current_a == 0.0 {
             return Ok(0.0);
         }
-        let distance_m = lowest_m - shape.top_m;
-        let sources =
-            |array: &Self| ArraySources::of_saturated(array, lowest_m, distance_m, 0.1 * tolerance);
+        let above = Clearance::above(lowest_m, lowest_m - shape.top_m);
+        let sources = |array: &Self| ArraySources::of_saturated(array, above, 0.1 * tolerance);
         let (fine, coarse) = (sources(self), sources(other));
         let parts = Components::Gradient;
         let reach = self.winding.outer_radius_m;
@@ -390,12 +390,7 @@ impl SaturatedArray {
 impl ArraySources {
     /// As [`ArraySources::of_array`] for a saturated array at its working point: one drive, of all its currents.
     #[must_use]
-    pub fn of_saturated(
-        array: &SaturatedArray,
-        lowest_m: f64,
-        distance_m: f64,
-        tolerance: f64,
-    ) -> Self {
+    pub fn of_saturated(array: &SaturatedArray, clearance: Clearance, tolerance: f64) -> Self {
         let waves = 2 * array.modes() - 1;
         let all: Vec<_> = (0..array.positions_m.len())
             .flat_map(|core| array.layers(core).column_iter())
@@ -406,8 +401,7 @@ impl ArraySources {
             &array.positions_m,
             &CoreLayers::of_each((array.positions_m.len(), 1), waves, layers),
             Near {
-                lowest_m,
-                distance_m,
+                clearance,
                 tolerance,
                 many: false,
                 winding: &array.winding,

@@ -250,6 +250,7 @@ mod tests {
     use super::*;
     use crate::steel::CoreShape;
     use crate::steel::array::CoupledArray;
+    use crate::steel::clearance::Clearance;
     use crate::steel::equivalent_dipoles::ArraySources;
     use crate::winding::Winding;
 
@@ -315,8 +316,11 @@ mod tests {
             let positions_m = grid(pitch);
             let array =
                 CoupledArray::new(&winding, shape, 470.0, &positions_m, 1e-3, lowest_m).unwrap();
-            let sources =
-                ArraySources::for_many_points(&array, lowest_m, lowest_m - shape.top_m, tolerance);
+            let sources = ArraySources::for_many_points(
+                &array,
+                Clearance::above(lowest_m, lowest_m - shape.top_m),
+                tolerance,
+            );
             let points: Vec<[f64; 3]> = (0..200)
                 .map(|k| {
                     let part = |step: f64| (0.5 + step * f64::from(k)).fract();

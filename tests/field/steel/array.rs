@@ -10,6 +10,7 @@ use fluxform_coil::mutual::mutual_inductance_h;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::coupling::Coupling;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
@@ -59,7 +60,7 @@ fn solve(positions: &[[f64; 2]], tolerance: f64) -> CoupledArray {
 
 /// The steel's part per ampere of `drive` at a point: dB_z/dz and B_z.
 fn steel(array: &CoupledArray, points: &[[f64; 3]], drive: usize) -> Vec<[f64; 2]> {
-    let sources = ArraySources::of_array(array, LOWEST_M, LOWEST_M, 1e-8);
+    let sources = ArraySources::of_array(array, Clearance::above(LOWEST_M, LOWEST_M), 1e-8);
     let mut out = vec![0.0; array.positions_m.len() * Components::All.count() * points.len()];
     sources.sample(points, Components::All, &mut out);
     let component = |part: usize, point: usize| {
@@ -461,7 +462,7 @@ fn near_fields_by_dipoles_are_those_by_loops() {
     let layer = one.layers(0, 0).column(0).iter().copied().collect();
     let core = MagnetizedCore::new(one.response.outline.clone(), layer);
     for distance_m in [0.0009, 0.0031, 0.017] {
-        let sources = ArraySources::of_array(&one, distance_m, distance_m, 1e-7);
+        let sources = ArraySources::of_array(&one, Clearance::above(distance_m, distance_m), 1e-7);
         let points: Vec<[f64; 3]> = [0.0, 0.0031, 0.0089, 0.0117, 0.0163, 0.041]
             .map(|r| [0.6 * r, -0.8 * r, distance_m])
             .to_vec();
@@ -500,7 +501,7 @@ fn near_fields_by_dipoles_are_those_by_loops() {
 #[test]
 fn the_field_of_an_array_is_divergence_free_and_a_gradient() {
     let array = at(&SCATTER, 1e-4, 0.05);
-    let sources = ArraySources::of_array(&array, LOWEST_M, LOWEST_M, 1e-7);
+    let sources = ArraySources::of_array(&array, Clearance::above(LOWEST_M, LOWEST_M), 1e-7);
     let h = 1e-4;
     let centre = [0.013, -0.022, 0.019];
     let mut points = vec![centre];

@@ -6,6 +6,7 @@ use cpu_time::ProcessTime;
 use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::exchange::Grading;
 use fluxform_field::steel::generatrix::Generatrix;
@@ -151,8 +152,9 @@ impl Crowd {
     /// The larger difference of gradients, relative to the largest at a height, and of inductances.
     fn difference(&self, a: &CoupledArray, b: &CoupledArray) -> f64 {
         let distance_m = self.lowest_m - self.shape.top_m;
-        let sources =
-            [a, b].map(|array| ArraySources::of_array(array, self.lowest_m, distance_m, 1e-6));
+        let sources = [a, b].map(|array| {
+            ArraySources::of_array(array, Clearance::above(self.lowest_m, distance_m), 1e-6)
+        });
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
         for height in [0.0, 0.7, 2.3] {

@@ -8,6 +8,7 @@ use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::clearance::Clearance;
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::permeability::Permeability;
@@ -88,7 +89,11 @@ fn stout(random: &mut Random) -> Design {
 fn gradients(case: &Case, array: &SaturatedArray) -> (Vec<f64>, Vec<f64>) {
     let Design { winding, core, .. } = case.design;
     let lowest_m = case.design.lowest_m();
-    let sources = ArraySources::of_saturated(array, lowest_m, lowest_m - core.top_m, 1e-8);
+    let sources = ArraySources::of_saturated(
+        array,
+        Clearance::above(lowest_m, lowest_m - core.top_m),
+        1e-8,
+    );
     let (mut all, mut sizes) = (Vec::new(), Vec::new());
     for height in HEIGHTS {
         let z_m = lowest_m + height * core.radius_m;

@@ -8,6 +8,7 @@ use fluxform::RunError;
 use fluxform::design::Need;
 use fluxform::field::components::Components;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
+use fluxform::field::steel::clearance::Clearance;
 use fluxform::field::steel::equivalent_dipoles::ArraySources;
 use fluxform::progress::Progress;
 use fluxform::scene::Scene;
@@ -67,7 +68,7 @@ struct Values {
 
 fn values(array: &CoupledArray) -> Values {
     let drives = array.positions_m.len();
-    let sources = ArraySources::of_array(array, LOWEST_M, LOWEST_M, EVALUATION);
+    let sources = ArraySources::of_array(array, Clearance::above(LOWEST_M, LOWEST_M), EVALUATION);
     let mut gradients = vec![0.0; drives * Components::Gradient.count() * PLACES.len()];
     sources.sample(&PLACES, Components::Gradient, &mut gradients);
     Values {

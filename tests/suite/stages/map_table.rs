@@ -7,6 +7,7 @@ use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::RunError;
 use fluxform::design::{Design, Need};
+use fluxform::field::steel::clearance::Clearance;
 use fluxform::field::steel::equivalent_dipoles::ArraySources;
 use fluxform::map::coupled_map::SampledField;
 use fluxform::map::tabulate::{Grid, tabulate};
@@ -194,7 +195,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     };
     let looked = looked_at(&grid, scene.coils.len());
     // The dipoles themselves, finer than any row's.
-    let finest = ArraySources::of_array(array, lowest_m, lowest_m, 1e-10);
+    let finest = ArraySources::of_array(array, Clearance::above(lowest_m, lowest_m), 1e-10);
     let points: Vec<[f64; 3]> = looked
         .iter()
         .map(|[_, z, y, x]| [grid.x_m[*x], grid.y_m[*y], grid.z_m[*z]])
@@ -214,7 +215,11 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     for &tolerance in pace.settings(&COUPLED, 4) {
         let (map, timing) = pace.time(progress, || {
             let own = MAP_SHARE * tolerance;
-            let sources = ArraySources::of_array(array, lowest_m, lowest_m, 0.1 * tolerance);
+            let sources = ArraySources::of_array(
+                array,
+                Clearance::above(lowest_m, lowest_m),
+                0.1 * tolerance,
+            );
             let field = SampledField::new(&sources, &grid, Components::Gz, own, 1, &Silent)?;
             Ok(field.map(&scene.coils, &grid, &Silent)?)
         })?;
