@@ -612,7 +612,13 @@ impl LimitName {
     /// Whether it follows from geometry and cannot be blamed on a limit that was set.
     #[must_use]
     pub(crate) fn is_geometry(self) -> bool {
-        self.is_equality() || matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
+        self.is_equality() || self.is_least_size()
+    }
+
+    /// Whether it is the least size that a coil of its wire can have, which no limit that is set changes.
+    #[must_use]
+    pub fn is_least_size(self) -> bool {
+        matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
     }
 }
 

@@ -47,7 +47,11 @@ const MEANINGS: &[(&str, &str)] = &[
         "wire.temperature_c",
         "of the winding, for its resistance and heat; by its linear law copper has no resistance at -234.45 C",
     ),
-    ("wire.choices_mm", "wires that `optimize` may choose from"),
+    (
+        "wire.choices_mm",
+        "wires that `optimize` may choose from, over the insulation, the conductor in the proportion of the two above; \
+         a gauge is the conductor's",
+    ),
     (
         "core.clearance_mm",
         "between the core and the bore, in radius",

@@ -74,11 +74,13 @@ pub fn wire(mut s: Section<'_>) -> WireDraft {
     let temperature = Rule::any("C").bound(Bound::AtLeast(COLDEST_COPPER_C));
     let diameter = s.required("diameter_mm", &WIRE_MM.positive());
     let conductor = s.number("conductor_diameter_mm", &WIRE_MM.positive());
+    let conductor = conductor.unwrap_or_else(|| {
+        s.assume("conductor_diameter_mm", number(diameter.value));
+        diameter.clone()
+    });
+    let insulated = diameter.value / conductor.value;
     let draft = WireDraft {
-        conductor: conductor.unwrap_or_else(|| {
-            s.assume("conductor_diameter_mm", number(diameter.value));
-            diameter.clone()
-        }),
+        conductor,
         diameter,
         resistivity_ohm_m: s.number_or(
             "resistivity_ohm_m",
@@ -86,12 +88,27 @@ pub fn wire(mut s: Section<'_>) -> WireDraft {
             COPPER_RESISTIVITY_OHM_M,
         ),
         temperature_c: s.number_or("temperature_c", &temperature, REFERENCE_TEMPERATURE_C),
-        choices: s
-            .numbers("choices_mm", &WIRE_MM.positive())
-            .map_or_else(Vec::new, |c| c.value),
+        choices: wire_choices(&mut s, insulated),
     };
     s.finish();
     draft
+}
+
+/// Diameters over the insulation that may be chosen, mm: that of a gauge, which is a conductor's, is `insulated`
+/// times as large.
+fn wire_choices(s: &mut Section<'_>, insulated: f64) -> Vec<f64> {
+    let Some(choices) = s.numbers("choices_mm", &WIRE_MM.positive()) else {
+        return Vec::new();
+    };
+    let gauges = s.texts_among("choices_mm");
+    let over = |(diameter, gauge)| {
+        if gauge {
+            diameter * insulated
+        } else {
+            diameter
+        }
+    };
+    choices.value.into_iter().zip(gauges).map(over).collect()
 }
 
 /// `[core]`, mm.

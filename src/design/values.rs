@@ -119,6 +119,18 @@ impl<'a> Section<'a> {
         Some(located(values, found))
     }
 
+    /// Whether each item of a list is a text.
+    pub fn texts_among(&mut self, key: &'static str) -> Vec<bool> {
+        match self.found(key).map(Spanned::get_ref) {
+            Some(DeValue::Array(items)) => {
+                let is_text =
+                    |item: &Spanned<DeValue>| matches!(item.get_ref(), DeValue::String(_));
+                items.iter().map(is_text).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// One number, or a list of numbers, with a default; an empty list where at fault.
     pub fn one_or_many(
         &mut self,

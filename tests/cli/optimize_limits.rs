@@ -1,5 +1,8 @@
 //! The limits of `optimize` where roundings, reversing drivers and whole turns decide.
 
+use std::f64::consts::PI;
+
+use fluxform::units::STEEL_DENSITY_KG_PER_M3;
 use serde_json::Value;
 
 use fluxform_testing::place::Place;
@@ -390,4 +393,60 @@ fn a_file_that_stands_in_the_way_is_named_before_the_search() {
         .run(readable)
         .ends(0)
         .says(&["best.toml exists: without --force it is kept"]);
+}
+
+/// That no coil is less than a layer deep or a turn long was said to be worth a thinner wire, whose resistance
+/// takes more than it gives.
+#[test]
+fn regression_a_thinner_wire_was_promised_more_force() {
+    let place = Place::new();
+    let text = "name = \"flat\"\n[coil]\ninner_diameter_mm = 10\nouter_diameter_mm = 20\nlength_mm = 20\n\
+                [wire]\ndiameter_mm = 0.467\n[supply]\ncurrent_max_a = 6.1\n[target]\nheight_mm = 5.3\n\
+                [limits]\npower_max_w = 0.21\n";
+    place.write("design.toml", text);
+    let args = ["optimize", "design.toml"];
+    let json = place.run(&[&args[..], &["--format", "json", "-q"]].concat());
+    let result = json.ends(0).json();
+    assert_eq!(result["bounds"]["one_turn_m"]["active"], true, "{result}");
+    let page = ["--report", "page.html"];
+    let shown = place.run(&[&args[..], &page].concat()).ends(0).out;
+    assert!(shown.contains("more of heat gives"), "{shown}");
+    assert!(!shown.contains("of wire diameter"), "{shown}");
+    assert!(
+        place
+            .text("page.html")
+            .contains("The force is held back by")
+    );
+}
+
+/// Coils were said to be lighter by their wire, and looked for by wire and core.
+#[test]
+fn regression_coils_heavier_with_their_core_were_called_lighter() {
+    let place = Place::new();
+    for more in [&[][..], &["--wound"]] {
+        let args = [
+            &["optimize", "designs/seed.toml", "--format", "json", "-q"],
+            more,
+        ]
+        .concat();
+        let result = place.run(&args).ends(0).json();
+        let best_kg = number(&result, "coil/mass_kg");
+        let others = result["alternatives"].as_array().unwrap();
+        assert!(!others.is_empty());
+        for other in others {
+            let named = other["better"].as_array().unwrap();
+            let lighter = named.iter().any(|word| word == "lighter");
+            let mass_kg = number(other, "mass_kg");
+            assert_eq!(lighter, mass_kg < best_kg, "{best_kg}: {other}");
+            // The core is as wide as the bore, and 10 mm longer below.
+            let radius_m = 0.5 * number(other, "inner_diameter_m");
+            let length_m = 0.01 + number(other, "length_m");
+            let core_kg = STEEL_DENSITY_KG_PER_M3 * PI * radius_m.powi(2) * length_m;
+            let wire_kg = mass_kg - core_kg;
+            assert!(
+                (wire_kg / number(other, "wire_mass_kg") - 1.0).abs() < 1e-9,
+                "{other}"
+            );
+        }
+    }
 }

@@ -248,3 +248,16 @@ fn only_some_commands_need_the_coil() {
         );
     }
 }
+
+/// A gauge was taken for the diameter over the insulation of a wire with a thinner conductor.
+#[test]
+fn regression_a_gauge_among_wires_to_choose_from_was_another_gauge() {
+    let with = "diameter_mm = 0.7\nconductor_diameter_mm = 0.65\nchoices_mm = [\"AWG 24\", 0.56]";
+    let wire = sound(&sound_but("diameter_mm = 0.7", with)).wire;
+    let conductors_m = wire.choices_m.iter().map(|over_m| over_m * 0.65 / 0.7);
+    let conductors_m: Vec<f64> = conductors_m.collect();
+    // 0.127 mm x 92^((36 - 24) / 39), ASTM B 258.
+    for (found, known) in conductors_m.iter().zip([5.105_596e-4, 5.2e-4]) {
+        assert!((found / known - 1.0).abs() < 1e-6, "{conductors_m:?}");
+    }
+}

@@ -74,6 +74,7 @@ fn of_regime<'a>(model: &'a dyn CoilModel, task: &'a Task, best: &BestCoil) -> O
 /// A local optimum of `problem` as a coil like `best`.
 fn coil_of(problem: &Problem<'_>, local: &Local, best: &BestCoil) -> Option<BestCoil> {
     let window = Problem::window(local.x);
+    let rated = problem.rate(window)?;
     Some(BestCoil {
         window,
         strand: best.strand,
@@ -81,7 +82,8 @@ fn coil_of(problem: &Problem<'_>, local: &Local, best: &BestCoil) -> Option<Best
         whole: None,
         regime: best.regime,
         force_n: (-local.point.objective).exp(),
-        current_a: problem.rate(window)?.current_a,
+        current_a: rated.current_a,
+        mass_kg: rated.mass_kg,
         limits: Vec::new(),
     })
 }
@@ -110,22 +112,10 @@ fn least(
     best: &BestCoil,
     sought: Advantage,
 ) -> Option<BestCoil> {
-    let volume = best.window.volume_over_pi_m3().value;
-    let resistance_ohm = volume * best.strand.resistance_per_volume();
-    let core_kg = model
-        .response(
-            &best.window,
-            best.strand.turns_per_m2(),
-            best.current_a,
-            false,
-        )
-        .ok()?
-        .core_mass_kg
-        .value;
     let value = match sought {
         Advantage::Shorter => best.window.length_m,
-        Advantage::Lighter => volume * best.strand.mass_per_volume() + core_kg,
-        Advantage::Cooler => best.current_a * best.current_a * resistance_ohm,
+        Advantage::Lighter => best.mass_kg,
+        Advantage::Cooler => best.power_w(),
         Advantage::Windable => return None,
     };
     let enough = best.force_n.ln() + (-SHARE).ln_1p();

@@ -6,7 +6,7 @@ use super::model::Window;
 use super::outcome::{
     Advantage, Alternative, BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, WholeTurns,
 };
-use super::problem::{LimitName, Problem};
+use super::problem::Problem;
 use super::search;
 use super::sqp::ACTIVE;
 
@@ -84,12 +84,7 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<BestCoil> {
         .bounds
         .iter()
         .enumerate()
-        .filter(|(_, bound)| {
-            !matches!(
-                bound.name,
-                LimitName::Axis | LimitName::OneLayer | LimitName::OneTurn
-            )
-        })
+        .filter(|(_, bound)| !bound.name.is_least_size())
         .map(|(row, bound)| {
             let active = point.rows[row].abs() <= ACTIVE;
             LimitUse::new(
@@ -112,6 +107,7 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<BestCoil> {
         regime: problem.regime,
         current_a: rated.current_a,
         force_n: rated.force_n.value,
+        mass_kg: rated.mass_kg,
         limits,
     })
 }

@@ -152,6 +152,8 @@ pub struct BestCoil {
     pub current_a: f64,
     /// |force| at the target at the rated current, N.
     pub force_n: f64,
+    /// Mass of wire and core, kg.
+    pub mass_kg: f64,
     /// The limits.
     pub limits: Vec<LimitUse>,
 }
@@ -207,9 +209,9 @@ impl Advantage {
     /// Every one that has less of something, in the order of `Advantage::amounts`.
     pub const LESS: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
 
-    /// Length, m, mass of the wire, kg, and heat, W, of `coil`.
+    /// Length, m, mass, kg, and heat, W, of `coil`.
     pub(super) fn amounts(coil: &BestCoil) -> [f64; 3] {
-        [coil.window.length_m, coil.wire_mass_kg(), coil.power_w()]
+        [coil.window.length_m, coil.mass_kg, coil.power_w()]
     }
 }
 
@@ -232,6 +234,8 @@ pub struct Alternative {
     pub force_lost: f64,
     /// Mass of the wire's metal, kg.
     pub wire_mass_kg: f64,
+    /// Mass of wire and core, kg.
+    pub mass_kg: f64,
     /// Heat at the rated current, W.
     pub power_w: f64,
     /// In what it is better.
@@ -260,6 +264,7 @@ impl Alternative {
             force_n: coil.force_n,
             force_lost: 1.0 - coil.force_n / best.force_n,
             wire_mass_kg: coil.wire_mass_kg(),
+            mass_kg: coil.mass_kg,
             power_w: coil.power_w(),
             better,
         }

@@ -162,6 +162,8 @@ pub struct Rated {
     pub current_a: f64,
     /// |force| at the target, N, by the window.
     pub force_n: Sloped,
+    /// Mass of wire and core, kg.
+    pub mass_kg: f64,
     /// The bounded values, SI, in the order of the problem's bounds, by the window.
     pub values: Vec<Sloped>,
 }
@@ -317,7 +319,7 @@ impl<'a> Problem<'a> {
             value,
             slope: [slope[0], slope[1], slope[2], 0.0],
         };
-        let mass = || {
+        let mass = {
             let mut sum = volume.times(self.strand.mass_per_volume());
             sum.value += response.core_mass_kg.value;
             let slopes = sum.slope.iter_mut().zip(response.core_mass_kg.slope);
@@ -336,8 +338,8 @@ impl<'a> Problem<'a> {
             CoilQuantity::Depth => along(window.depth_m, [0.0, 1.0, 0.0]),
             CoilQuantity::WindingFill => along(1.0, [0.0; 3]),
             CoilQuantity::Power => current.product(current).product(resistance),
-            CoilQuantity::Mass => mass(),
-            CoilQuantity::ArrayMass => mass().times(self.task.drivers.ends_a.len() as f64),
+            CoilQuantity::Mass => mass,
+            CoilQuantity::ArrayMass => mass.times(self.task.drivers.ends_a.len() as f64),
             CoilQuantity::ArrayPower => self.task.array_power_w(resistance),
             CoilQuantity::WireLength => volume.times(self.strand.length_per_volume()),
             CoilQuantity::CoreField => response.core_field_t.along(current),
@@ -352,6 +354,7 @@ impl<'a> Problem<'a> {
             window,
             current_a: current.value,
             force_n,
+            mass_kg: mass.value,
             values,
         })
     }

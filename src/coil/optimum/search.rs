@@ -440,6 +440,7 @@ pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
         regime: problem.regime,
         current_a: rated.current_a,
         force_n: rated.force_n.value,
+        mass_kg: rated.mass_kg,
         limits,
     })
 }

@@ -70,7 +70,7 @@ fn answer(result: &Optimization) -> Section {
                 format!("{inner} to {outer}, {length} long").into(),
                 force(one.force_n).into(),
                 percent(one.force_lost).into(),
-                si(one.wire_mass_kg, "kg").into(),
+                si(one.mass_kg, "kg").into(),
                 si(one.power_w, "W").into(),
                 better(one).into(),
             ]
@@ -81,7 +81,7 @@ fn answer(result: &Optimization) -> Section {
                 ("diameters, length / mm", false),
                 ("force", true),
                 ("lost", true),
-                ("wire", true),
+                ("mass", true),
                 ("heat", true),
                 ("better in being", false),
             ],
@@ -134,6 +134,10 @@ fn limits(result: &Optimization) -> Section {
     said(result, &limits, &mut body);
     // The gain per percent compares limits of different units.
     let gain = |limit: &LimitUse| 0.01 * limit.limit * limit.sensitivity_n_per_unit;
+    let limits: Vec<&LimitUse> = limits
+        .into_iter()
+        .filter(|limit| !limit.name.is_least_size())
+        .collect();
     let most = limits.iter().map(|l| gain(l).abs()).fold(0.0, f64::max);
     let row = |limit: &&LimitUse| -> Vec<Cell> {
         let (name, unit) = words(limit.name.key());

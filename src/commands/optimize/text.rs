@@ -87,6 +87,7 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
     let (worth, shared): (Vec<&LimitUse>, Vec<&LimitUse>) = movable
         .filter(|(key, used)| used.holds_back() && !result.fixed.contains_key(*key))
         .map(|(_, used)| used)
+        .filter(|used| !used.name.is_least_size())
         .partition(|used| used.sensitivity_n_per_unit != 0.0);
     let mut held: Vec<String> = worth.into_iter().map(sensitivity).collect();
     if shared.len() > 1 {
@@ -327,15 +328,7 @@ fn limits(result: &Optimization) -> String {
 
 fn alternatives(list: &[Alternative]) -> String {
     let head = [
-        "instead",
-        "force",
-        "bore",
-        "outer",
-        "length",
-        "turns",
-        "wire mass",
-        "heat",
-        "",
+        "instead", "force", "bore", "outer", "length", "turns", "mass", "heat", "",
     ]
     .map(str::to_owned);
     let mut rows = vec![head.to_vec()];
@@ -351,7 +344,7 @@ fn alternatives(list: &[Alternative]) -> String {
             mm(other.size.outer_diameter_m),
             mm(other.size.length_m),
             turns,
-            mass(other.wire_mass_kg),
+            mass(other.mass_kg),
             si(other.power_w, "W"),
             better(other),
         ]);
