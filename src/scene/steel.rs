@@ -179,14 +179,22 @@ impl Solved {
         })
     }
 
-    /// The same solution, with the error that it has at places no lower than `lowest_m`.
+    /// The same solution, made for places anywhere, with the error that it has at `points_m`.
     ///
     /// # Errors
-    /// A place on a winding's edge.
-    pub(crate) fn with_lowest(self, lowest_m: f64) -> Result<Self, RunError> {
-        let steel_error = match self.steel().iron() {
-            Some(array) => array.error_from(lowest_m, STEEL_SHARE * self.tolerance)?,
-            None => self.steel_error,
+    /// A point on the steel or hardly off it; a place on a winding's edge.
+    pub(crate) fn at_points(self, scene: &Scene, points_m: &[[f64; 3]]) -> Result<Self, RunError> {
+        let clearance = clearance(scene, points_m, 0.0)?;
+        let lowest_m = clearance.lowest_m;
+        let steel_error = match (&self.steel, &scene.core) {
+            (Steel::Iron(array), _) => array.error_from(lowest_m, STEEL_SHARE * self.tolerance)?,
+            (Steel::Coupled(array), Some(core)) => {
+                let permeability = self.relative_permeability;
+                let request =
+                    request(scene, core, permeability, self.tolerance, f64::NEG_INFINITY)?;
+                request.error_at(array, clearance)?
+            }
+            _ => self.steel_error,
         };
         Ok(Self {
             lowest_m,

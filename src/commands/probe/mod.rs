@@ -93,7 +93,7 @@ pub fn probe(
 ) -> Result<ProbeTable, RunError> {
     finite(&points_m)?;
     let scene = Scene::with_tolerance(design, request.tolerance)?;
-    let solved = solve_anywhere(&scene, points_m.iter().map(|p| p[2]))?;
+    let solved = solve_anywhere(&scene, &points_m)?;
     let groups = groups(&scene, &points_m)?;
     progress.begin("probe", points_m.len() as u64);
     let coils = scene.coils.len();
@@ -174,16 +174,16 @@ fn finite(points_m: &[[f64; 3]]) -> Result<(), RunError> {
     )))
 }
 
-/// The steel of `scene` for points at `heights_m`.
+/// The steel of `scene` for `points_m`.
 ///
 /// A value depends on its own point alone: neither the solution nor how it is evaluated may depend on where
 /// the other points are. What is stated of them all may.
 ///
 /// # Errors
 /// As [`steel::solve`].
-fn solve_anywhere(scene: &Scene, heights_m: impl Iterator<Item = f64>) -> Result<Solved, RunError> {
+fn solve_anywhere(scene: &Scene, points_m: &[[f64; 3]]) -> Result<Solved, RunError> {
     let solved = steel::solve(scene, scene.tolerances.field, f64::NEG_INFINITY)?;
-    solved.with_lowest(heights_m.fold(f64::INFINITY, f64::min))
+    solved.at_points(scene, points_m)
 }
 
 /// The error of the field.

@@ -739,7 +739,7 @@ mod tests {
                 levels: 1,
                 panel_m: 0.4,
             };
-            let surface = Surface::new(faces, &resolution, None);
+            let surface = Surface::new(faces, &resolution, &|_, _| f64::INFINITY);
             let mut inside = 0;
             for k in 0..1500 {
                 let [u, v, w] =

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::arrangement;
 use super::face::{Face, Point, Resolution, SAME_M};
 use super::mesh_body::MeshBody;
-use super::near_windings::Windings;
+use super::near_sources::{LongestSide, MagnetRoom, Windings};
 pub use super::plate::{Fault, Outline, Plate};
 pub use super::prisms::Contact;
 use super::prisms::{self, Prism, connected, is_mirrored};
@@ -563,15 +563,21 @@ impl Iron {
 
     /// Its mirrored part at one of the [`RESOLUTIONS`].
     pub(super) fn surface(&self, tier: usize) -> Surface {
-        self.cut(tier, self.windings.as_ref())
+        self.cut(tier, &|panel, face| match &self.windings {
+            // Cores are as small as their windings by themselves.
+            Some(windings) if face.bore.is_none() => windings.longest_m(panel),
+            _ => f64::INFINITY,
+        })
     }
 
-    /// The same for other sources than the windings.
-    pub(super) fn surface_for_magnets(&self, tier: usize) -> Surface {
-        self.cut(tier, None)
+    /// The same for magnets, cut more finely near `room` where that is named.
+    pub(super) fn surface_for_magnets(&self, tier: usize, room: Option<&MagnetRoom>) -> Surface {
+        self.cut(tier, &|panel, _| {
+            room.map_or(f64::INFINITY, |room| room.longest_m(panel))
+        })
     }
 
-    fn cut(&self, tier: usize, windings: Option<&Windings>) -> Surface {
+    fn cut(&self, tier: usize, longest_m: &LongestSide<'_>) -> Surface {
         let (order, levels, along) = RESOLUTIONS[tier];
         let resolution = Resolution {
             order,
@@ -579,7 +585,7 @@ impl Iron {
             levels,
             panel_m: self.largest_m / along,
         };
-        Surface::new(self.part(), &resolution, windings)
+        Surface::new(self.part(), &resolution, longest_m)
     }
 }
 

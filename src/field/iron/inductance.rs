@@ -2,7 +2,7 @@
 
 use super::axial_profile::AxialProfile;
 use super::face::{Node, Panel};
-use super::near_windings::{Windings, from_section_m};
+use super::near_sources::{Windings, add_halved, from_section_m};
 use super::parts::Rule;
 use super::surface::{FAR, Surface, mirrored};
 use crate::frame::to_cartesian;
@@ -55,7 +55,9 @@ impl Linkage<'_> {
         let panels = self.surface.panels().par_iter().enumerate();
         let first = panels.flat_map_iter(|(number, panel)| {
             let mut halved = Vec::new();
-            winding.add_halved(*panel, &self.surface.faces[panel.face], &mut halved);
+            let face = &self.surface.faces[panel.face];
+            let longest_m = |panel: &Panel, _: &_| winding.longest_m(panel);
+            add_halved(*panel, face, &longest_m, &mut halved);
             halved.into_iter().map(move |part| self.part(number, part))
         });
         let mut parts = first.collect::<Result<Vec<Part>, OnEdge>>()?;

@@ -20,7 +20,7 @@ pub mod clearance;
 pub mod face;
 mod inductance;
 pub mod mesh_body;
-mod near_windings;
+mod near_sources;
 mod panel_columns;
 mod parts;
 pub mod passive;

@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 use super::array::{MOST_ENTRIES, RESOLUTIONS, coarsest};
 use super::bodies::Iron;
 use super::face::Point;
+use super::near_sources::MagnetRoom;
 use super::surface::{Surface, mirrored};
 use super::system::{FactoredSystem, System};
 use crate::steel::passive::isolated::placed;
@@ -37,8 +38,8 @@ struct Answer {
 
 impl Answer {
     /// `None` where the equations have no solution.
-    fn new(iron: &Iron, tier: usize) -> Option<Self> {
-        let surface = iron.surface_for_magnets(tier);
+    fn new(iron: &Iron, tier: usize, room: Option<&MagnetRoom>) -> Option<Self> {
+        let surface = iron.surface_for_magnets(tier, room);
         let images = iron.images();
         let system = System::new(iron, &surface, &images, 0.0, usize::MAX)
             .ok()?
@@ -95,16 +96,51 @@ impl Answer {
     }
 }
 
-/// The first and the last of the [`RESOLUTIONS`] to try for a tolerance, in the memory that there is.
-fn tiers(iron: &Iron, tolerance: f64) -> [usize; 2] {
+/// The last of the [`RESOLUTIONS`] for which there is memory; `None` where there is none for two.
+fn last_tier(iron: &Iron, room: Option<&MagnetRoom>) -> Option<usize> {
     let images = iron.images().len();
     // Entries and their factors are held at once.
     let fits = |tier: &usize| {
-        let size = iron.surface_for_magnets(*tier).size();
+        let size = iron.surface_for_magnets(*tier, room).size();
         2 * images * size.pow(2) <= MOST_ENTRIES
     };
-    let last = (1..RESOLUTIONS.len()).take_while(fits).last().unwrap_or(1);
+    (1..RESOLUTIONS.len()).take_while(fits).last()
+}
+
+/// The first and the last of the [`RESOLUTIONS`] to try for a tolerance.
+fn tiers(tolerance: f64, last: Option<usize>) -> [usize; 2] {
+    let last = last.unwrap_or(1);
     [coarsest(tolerance).min(last - 1), last]
+}
+
+/// Where the dipoles of `magnet` may be with its centre among `places_m`, and their images.
+fn room(iron: &Iron, magnet: &PassiveMagnet, places_m: &[Point]) -> MagnetRoom {
+    let ends = |i: usize| {
+        let of = places_m.iter().map(|place| place[i]);
+        [
+            of.clone().fold(f64::INFINITY, f64::min),
+            of.fold(f64::NEG_INFINITY, f64::max),
+        ]
+    };
+    let [x_m, y_m, z_m] = [0, 1, 2].map(ends);
+    let rule = magnet.rule(z_m[0]);
+    let reach_m = rule
+        .iter()
+        .map(|dipole| norm(dipole.at_m))
+        .fold(0.0, f64::max);
+    let images = iron.images().into_iter().map(|signs| {
+        let [x_m, y_m] = [(x_m, 0), (y_m, 1)].map(|(ends, axis)| {
+            let plane_m = iron.planes_m[axis];
+            let [a, b] = ends.map(|at| plane_m + signs[axis] * (at - plane_m));
+            [a.min(b), a.max(b)]
+        });
+        let sides = [x_m, y_m, z_m];
+        [
+            sides.map(|[low, _]| low - reach_m),
+            sides.map(|[_, high]| high + reach_m),
+        ]
+    });
+    MagnetRoom(images.collect())
 }
 
 /// The pull on a magnet.
@@ -129,14 +165,44 @@ impl IronPull {
         places_m: &[Point],
         tolerance: f64,
     ) -> Option<Self> {
+        let mut best: Option<Self> = None;
+        let room = room(iron, &magnet, places_m);
+        // Panels of the whole steel's size do for most; what they do not do for takes finer ones near the magnet.
+        for room in [None, Some(&room)] {
+            let last = last_tier(iron, room);
+            if last.is_none() && best.is_some() {
+                break;
+            }
+            let made = Self::among(iron, magnet, places_m, tolerance, (room, last))?;
+            if best
+                .as_ref()
+                .is_none_or(|b| made.relative_error < b.relative_error)
+            {
+                best = Some(made);
+            }
+            if best.as_ref().is_some_and(|b| b.relative_error <= tolerance) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The same among the resolutions up to `last`, cut more finely near `room` where that is named.
+    fn among(
+        iron: &Iron,
+        magnet: PassiveMagnet,
+        places_m: &[Point],
+        tolerance: f64,
+        (room, last): (Option<&MagnetRoom>, Option<usize>),
+    ) -> Option<Self> {
         let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
         let bound = magnet.rule_error(lowest_m);
-        let [first, last] = tiers(iron, tolerance);
-        let mut pull = Self::at_resolution(iron, magnet, first)?;
+        let [first, last] = tiers(tolerance, last);
+        let mut pull = Self::at_tier(iron, magnet, first, room)?;
         let coarsest = pull.forces_n(places_m);
         let mut forces = coarsest.clone();
         for tier in first + 1..=last {
-            pull = Self::at_resolution(iron, magnet, tier)?;
+            pull = Self::at_tier(iron, magnet, tier, room)?;
             let finer = pull.forces_n(places_m);
             let difference = |coarse: &[Point]| {
                 let apart = |(a, b): (&Point, &Point)| norm(minus(*a, *b)) / norm(*b);
@@ -155,16 +221,25 @@ impl IronPull {
     /// Unknowns of one mirrored part, and number of the parts, of the coarsest solution that [`IronPull::new`] ends with.
     #[must_use]
     pub fn least_size(iron: &Iron, tolerance: f64) -> [usize; 2] {
-        let [first, _] = tiers(iron, tolerance);
-        let surface = iron.surface_for_magnets(first + 1);
+        let [first, _] = tiers(tolerance, last_tier(iron, None));
+        let surface = iron.surface_for_magnets(first + 1, None);
         [surface.size(), iron.images().len()]
     }
 
     /// At one of the [`RESOLUTIONS`]; `None` where the steel's equations have no solution.
     #[must_use]
     pub fn at_resolution(iron: &Iron, magnet: PassiveMagnet, tier: usize) -> Option<Self> {
+        Self::at_tier(iron, magnet, tier, None)
+    }
+
+    fn at_tier(
+        iron: &Iron,
+        magnet: PassiveMagnet,
+        tier: usize,
+        room: Option<&MagnetRoom>,
+    ) -> Option<Self> {
         Some(Self {
-            answer: Answer::new(iron, tier)?,
+            answer: Answer::new(iron, tier, room)?,
             magnet,
             relative_error: f64::NAN,
         })

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::face::{Face, Node, Panel, Point, Resolution};
-use super::near_windings::Windings;
+use super::near_sources::{LongestSide, add_halved};
 use super::parts::{Parts, Place, coordinate_rounding_m};
 use crate::steel::clearance::Clearance;
 use crate::steel::passive::reaction::Induced;
@@ -49,23 +49,17 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// `faces` cut as `resolution` asks for, and more finely near `windings`.
+    /// `faces` cut as `resolution` asks for, and so that no side is longer than `longest_m` says.
     #[must_use]
     pub(super) fn new(
         faces: Vec<Face>,
         resolution: &Resolution,
-        windings: Option<&Windings>,
+        longest_m: &LongestSide<'_>,
     ) -> Self {
         let mut panels: Vec<Panel> = Vec::new();
         for (number, face) in faces.iter().enumerate() {
             for panel in face.panels(number, resolution) {
-                match windings {
-                    // Cores are as small as their windings by themselves.
-                    Some(windings) if face.bore.is_none() => {
-                        windings.add_halved(panel, face, &mut panels);
-                    }
-                    _ => panels.push(panel),
-                }
+                add_halved(panel, face, longest_m, &mut panels);
             }
         }
         let (mut nodes, mut firsts, mut panel_of) = (Vec::new(), Vec::new(), Vec::new());

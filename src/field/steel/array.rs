@@ -56,6 +56,8 @@ pub struct CoupledArray {
     /// and of the inductances, relative to the largest; the larger. The difference from the next
     /// coarser resolution, or twice what is known of the exchange between the cores.
     pub relative_error: f64,
+    /// Refinements of the resolution after which it was solved.
+    pub(super) refinement: usize,
     /// Relative residual of the linear solver.
     pub relative_residual: f64,
     /// Applications of the coupling.
@@ -134,6 +136,7 @@ impl CoupledArray {
             potentials: Potentials::Whole(Vec::new()),
             added_inductance_h: DMatrix::zeros(positions_m.len(), positions_m.len()),
             relative_error: f64::NAN,
+            refinement: 0,
             relative_residual: 0.0,
             iterations: 0,
         };

@@ -47,6 +47,8 @@ const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], 
 /// Angles beside a core at which they are compared, and the depths there, of that to which places go.
 const ANGLES_BESIDE: usize = 8;
 const DEPTHS_BESIDE: [f64; 2] = [0.1, 0.5];
+/// By what distances may differ in rounding, relative.
+const ROUNDING: f64 = 1e-9;
 
 /// Places about an axis at which two resolutions are compared.
 struct Places {
@@ -70,7 +72,8 @@ pub struct ArrayRequest<'a> {
     pub positions_m: &'a [[f64; 2]],
     /// The largest estimated error, as [`CoupledArray::relative_error`] has it.
     pub tolerance: f64,
-    /// Places are no lower, m.
+    /// Places are no lower, m; negative infinity where the solution is to depend on no places, whose error
+    /// [`ArrayRequest::error_at`] states.
     pub lowest_m: f64,
 }
 
@@ -175,6 +178,7 @@ impl CoupledArray {
         places: &Places,
         tolerance: f64,
     ) -> Result<f64, OnEdge> {
+        let shape = self.response.outline.shape;
         let near = (places.clearance, 0.05 * tolerance);
         let sources = |array: &Self| {
             if drives.len() == array.positions_m.len() {
@@ -187,13 +191,18 @@ impl CoupledArray {
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
         for z_m in &places.heights_m {
+            // Beside one core may be in another.
+            let is_clear = |[x, y, z]: &[f64; 3]| {
+                let mut cores = self.positions_m.iter();
+                let least_m = (1.0 - ROUNDING) * places.clearance.distance_m;
+                cores.all(|[cx, cy]| shape.distance_m((x - cx).hypot(y - cy), *z) >= least_m)
+            };
             let points: Vec<[f64; 3]> = (about.iter())
                 .flat_map(|[x, y]| {
-                    places
-                        .offsets_m
-                        .iter()
-                        .map(move |[dx, dy]| [x + dx, y + dy, *z_m])
+                    let offsets_m = places.offsets_m.iter();
+                    offsets_m.map(move |[dx, dy]| [x + dx, y + dy, *z_m])
                 })
+                .filter(is_clear)
                 .collect();
             let mut values = vec![0.0; drives.len() * parts.count() * points.len()];
             let mut others = values.clone();
@@ -269,6 +278,7 @@ impl<'a> ArrayRequest<'a> {
         };
         array.join(&solved);
         array.relative_error = choice.relative_error;
+        array.refinement = choice.refinement;
         Ok(array)
     }
 
@@ -356,7 +366,7 @@ impl<'a> ArrayRequest<'a> {
         let (shape, positions_m) = (self.shape, self.positions_m);
         let aim = (0..refinement).fold(FIRST_AIM * self.tolerance, |aim, _| FINER * aim);
         let mut fine = ArrayResolution::for_tolerance(aim, shape, closest_m(positions_m));
-        let near = self.lowest_m() < shape.top_m.max(0.0) + NEAR * shape.radius_m;
+        let near = self.clearance().lowest_m < shape.top_m.max(0.0) + NEAR * shape.radius_m;
         if near && fine.modes > 1 {
             // Close to a core its own modes are seen, before they have come back from another.
             fine.modes = (fine.modes + MODES_NEAR * refinement).min(MOST_MODES);
@@ -371,26 +381,60 @@ impl<'a> ArrayRequest<'a> {
         [coarse, fine]
     }
 
-    /// The least height above the array for which an error is estimated, m.
-    fn lowest_m(&self) -> f64 {
-        let above_m = self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m;
-        self.lowest_m.max(above_m)
+    /// The height below which places are close to the cores, m.
+    fn close_m(&self) -> f64 {
+        self.shape.top_m.max(0.0) + CLOSE * self.shape.radius_m
     }
 
-    /// Where two resolutions are compared: above the array, and beside the cores where places go as low.
-    fn places(&self) -> Vec<Places> {
-        let (shape, lowest_m) = (self.shape, self.lowest_m());
+    /// Of the places by which a resolution is chosen: where they may be anywhere, above the array.
+    fn clearance(&self) -> Clearance {
+        let closest_m = CLOSEST * self.shape.radius_m;
+        if self.lowest_m == f64::NEG_INFINITY {
+            Clearance::above(self.close_m(), closest_m)
+        } else {
+            Clearance::above(self.lowest_m, closest_m)
+        }
+    }
+
+    /// The error that `array`, which this request was solved as, has at places with `clearance`: more than
+    /// stated by itself where they are close to the cores.
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn error_at(&self, array: &CoupledArray, clearance: Clearance) -> Result<f64, OnEdge> {
+        if clearance.lowest_m >= self.close_m() {
+            return Ok(array.relative_error);
+        }
+        let [coarse, _] = self.resolutions(array.refinement);
+        let coarse = self.attempt(array.refinement, &coarse, &self.first_block())?;
+        let (drives, about) = self.compared(clearance);
+        let compared = (&drives[..], &about[..]);
+        let places = self.places(clearance);
+        let error = array.difference(&coarse.array, compared, &places, self.tolerance)?;
+        Ok(error.max(array.relative_error))
+    }
+
+    /// Where two resolutions are compared for places with `clearance`: above the array, and beside the cores
+    /// where places go as low.
+    fn places(&self, clearance: Clearance) -> Vec<Places> {
+        let shape = self.shape;
+        let distance_m = clearance.distance_m.max(CLOSEST * shape.radius_m);
+        let lowest_m = clearance.lowest_m.max(shape.top_m.max(0.0) + distance_m);
         let reach_m = self.winding.outer_radius_m;
-        let mut places = vec![Places {
+        let mut places = Vec::new();
+        let above = Places {
             clearance: Clearance::above(lowest_m, lowest_m - shape.top_m),
             heights_m: [0.0, 1.0, 4.0]
                 .map(|radii| lowest_m + radii * shape.radius_m)
                 .to_vec(),
             offsets_m: PLACES.map(|offset| offset.map(|by| reach_m * by)).to_vec(),
-        }];
-        let end_m = self.lowest_m.max(shape.bottom_m);
-        if end_m < shape.top_m {
-            let distance_m = CLOSEST * shape.radius_m;
+        };
+        if lowest_m <= clearance.highest_m {
+            places.push(above);
+        }
+        let end_m = clearance.lowest_m.max(shape.bottom_m);
+        let begin_m = clearance.highest_m.min(shape.top_m);
+        if end_m < shape.top_m && end_m <= begin_m {
             let offsets_m: Vec<[f64; 2]> = (0..ANGLES_BESIDE)
                 .map(|k| {
                     let (s, c) = (TAU * k as f64 / ANGLES_BESIDE as f64).sin_cos();
@@ -398,7 +442,7 @@ impl<'a> ArrayRequest<'a> {
                 })
                 .collect();
             places.extend(DEPTHS_BESIDE.map(|part| {
-                let z_m = shape.top_m - part * (shape.top_m - end_m);
+                let z_m = begin_m - part * (begin_m - end_m);
                 Places {
                     clearance: Clearance {
                         lowest_m: z_m,
@@ -416,12 +460,10 @@ impl<'a> ArrayRequest<'a> {
     /// The array at the first resolution that does, or that of the least estimated error; of many cores
     /// solved for the compared drives alone.
     fn best(&self) -> Result<Attempt<'a>, OnEdge> {
-        let (drives, about) = self.compared();
-        let solved = self
-            .drives_of_blocks()
-            .into_iter()
-            .next()
-            .unwrap_or_default();
+        let (drives, about) = self.compared(self.clearance());
+        let places = self.places(self.clearance());
+        let solved = self.first_block();
+        let mut not_better = 0;
         let mut best: Option<Attempt<'a>> = None;
         for refinement in 0..=MOST_REFINEMENTS {
             let [coarse, fine] = self.resolutions(refinement);
@@ -437,10 +479,10 @@ impl<'a> ArrayRequest<'a> {
             };
             let (coarse, mut fine) = (coarse?, fine?);
             let compared = (&drives[..], &about[..]);
-            let difference =
-                (fine.array).difference(&coarse, compared, &self.places(), self.tolerance)?;
+            let difference = (fine.array).difference(&coarse, compared, &places, self.tolerance)?;
             let error = exchange.max(difference);
             fine.array.relative_error = error;
+            fine.array.refinement = refinement;
             let better = best.as_ref().is_none_or(|b| error < b.array.relative_error);
             let reached = error <= self.tolerance;
             if better {
@@ -454,7 +496,9 @@ impl<'a> ArrayRequest<'a> {
             let [_, finer] = self.resolutions(refinement + 1);
             let capped =
                 finer.exchange_error(self.shape, closest_m(self.positions_m)) >= 0.5 * exchange;
-            if reached || !better || (exchange > self.tolerance && capped) {
+            // Once, two wrong solutions may agree by chance.
+            not_better = if better { 0 } else { not_better + 1 };
+            if reached || not_better > 1 || (exchange > self.tolerance && capped) {
                 break;
             }
         }
@@ -517,14 +561,19 @@ impl<'a> ArrayRequest<'a> {
         )
     }
 
+    /// The drives of the first block; none of a few cores.
+    fn first_block(&self) -> Vec<usize> {
+        let blocks = self.drives_of_blocks();
+        blocks.into_iter().next().unwrap_or_default()
+    }
+
     /// Drives by which two resolutions are compared, and axes about which: of a few coils all, but where
     /// places are close to the cores, of many those of the first block, and their neighbours.
-    fn compared(&self) -> (Vec<usize>, Vec<[f64; 2]>) {
+    fn compared(&self, clearance: Clearance) -> (Vec<usize>, Vec<[f64; 2]>) {
         let all = self.positions_m;
         let Some(block) = self.drives_of_blocks().into_iter().next() else {
             // Close places take many dipoles for every drive, and coils that are equivalent tell nothing new.
-            let close_m = self.shape.top_m.max(0.0) + CLOSE * self.shape.radius_m;
-            let drives = if self.lowest_m < close_m {
+            let drives = if clearance.lowest_m < self.close_m() {
                 representatives(all.len(), &motions(all))
             } else {
                 (0..all.len()).collect()
@@ -582,7 +631,7 @@ mod tests {
         let others: Vec<usize> = blocks[1..].concat();
         let compared = (&others[..], &positions_m[..]);
         let error = array
-            .difference(&truth, compared, &coarse.places(), 1e-5)
+            .difference(&truth, compared, &coarse.places(coarse.clearance()), 1e-5)
             .unwrap();
         assert!(
             error < array.relative_error && array.relative_error < 1e-3,

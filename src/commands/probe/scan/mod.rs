@@ -120,7 +120,7 @@ pub fn compare(
     }
     // As `probe` does: a fit moves the places, and what `probe` printed must be found again to the last
     // digits.
-    let solved = solve_anywhere(&scene, scan.positions_m.iter().map(|p| p[2]))?;
+    let solved = solve_anywhere(&scene, &scan.positions_m)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
