@@ -173,14 +173,15 @@ impl IronPull {
             if last.is_none() && best.is_some() {
                 break;
             }
-            let made = Self::among(iron, magnet, places_m, tolerance, (room, last))?;
-            if best
-                .as_ref()
-                .is_none_or(|b| made.relative_error < b.relative_error)
-            {
-                best = Some(made);
-            }
-            if best.as_ref().is_some_and(|b| b.relative_error <= tolerance) {
+            let made = Self::among(iron, magnet, places_m, tolerance, (room, last));
+            best = [best, made].into_iter().flatten().reduce(|a, b| {
+                if b.relative_error < a.relative_error {
+                    b
+                } else {
+                    a
+                }
+            });
+            if best.as_ref().is_none_or(|b| b.relative_error <= tolerance) {
                 break;
             }
         }
