@@ -68,11 +68,16 @@ impl Windings {
     }
 }
 
-/// Boxes in which dipoles of magnets may be, from corner to corner, m.
-pub(super) struct MagnetRoom(pub(super) Vec<[Point; 2]>);
+/// Where dipoles of magnets may be.
+pub(super) struct MagnetRoom {
+    /// Boxes, from corner to corner, m.
+    pub(super) boxes_m: Vec<[Point; 2]>,
+    /// The least distance that counts, m; > 0.
+    pub(super) least_m: f64,
+}
 
 impl MagnetRoom {
-    /// The longest side that a panel may have for its distance, m; that of the distance of its middle at least.
+    /// The longest side that a panel may have for its distance, m.
     pub(super) fn longest_m(&self, panel: &Panel) -> f64 {
         let from_box = |[low, high]: &[Point; 2]| {
             let off: Point = std::array::from_fn(|i| {
@@ -81,7 +86,8 @@ impl MagnetRoom {
             });
             norm(off) - panel.radius_m
         };
-        let distance_m = self.0.iter().map(from_box).fold(f64::INFINITY, f64::min);
-        LONGEST_BESIDE_MAGNET * distance_m
+        let distances_m = self.boxes_m.iter().map(from_box);
+        let distance_m = distances_m.fold(f64::INFINITY, f64::min);
+        LONGEST_BESIDE_MAGNET * distance_m.max(self.least_m)
     }
 }

@@ -24,6 +24,10 @@ use fluxform_numerics::vec3::{dot, minus, norm};
 const LEAST_SHARE: f64 = 0.1;
 /// Differences are known to be as much too small, between cores where their pulls nearly cancel.
 const SAFETY: f64 = 2.0;
+/// The least distance from a magnet that counts for panels, relative to its least height above the steel, and how
+/// often that fits into where the magnet may be: panels are no more than memory is there for.
+const LEAST_GAP: f64 = 0.2;
+const MOST_ACROSS: f64 = 40.0;
 /// Places whose layers are solved together.
 const TOGETHER: usize = 32;
 
@@ -113,34 +117,34 @@ fn tiers(tolerance: f64, last: Option<usize>) -> [usize; 2] {
     [coarsest(tolerance).min(last - 1), last]
 }
 
-/// Where the dipoles of `magnet` may be with its centre among `places_m`, and their images.
-fn room(iron: &Iron, magnet: &PassiveMagnet, places_m: &[Point]) -> MagnetRoom {
+/// Where the dipoles of `magnet` may be with its centre among `places_m`, and their images; `None` where they are
+/// not above the steel.
+fn room(iron: &Iron, magnet: &PassiveMagnet, places_m: &[Point]) -> Option<MagnetRoom> {
+    let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
+    let rule = magnet.rule(lowest_m);
     let ends = |i: usize| {
-        let of = places_m.iter().map(|place| place[i]);
-        [
-            of.clone().fold(f64::INFINITY, f64::min),
-            of.fold(f64::NEG_INFINITY, f64::max),
-        ]
+        let of = |ends: [f64; 2], at: f64| [ends[0].min(at), ends[1].max(at)];
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let centres = places_m.iter().map(|place| place[i]).fold(none, of);
+        let about = rule.iter().map(|dipole| dipole.at_m[i]).fold(none, of);
+        [centres[0] + about[0], centres[1] + about[1]]
     };
     let [x_m, y_m, z_m] = [0, 1, 2].map(ends);
-    let rule = magnet.rule(z_m[0]);
-    let reach_m = rule
-        .iter()
-        .map(|dipole| norm(dipole.at_m))
-        .fold(0.0, f64::max);
-    let images = iron.images().into_iter().map(|signs| {
+    let gap_m = z_m[0] - iron.top_m();
+    let image = |signs: [f64; 2]| {
         let [x_m, y_m] = [(x_m, 0), (y_m, 1)].map(|(ends, axis)| {
             let plane_m = iron.planes_m[axis];
             let [a, b] = ends.map(|at| plane_m + signs[axis] * (at - plane_m));
             [a.min(b), a.max(b)]
         });
         let sides = [x_m, y_m, z_m];
-        [
-            sides.map(|[low, _]| low - reach_m),
-            sides.map(|[_, high]| high + reach_m),
-        ]
-    });
-    MagnetRoom(images.collect())
+        [sides.map(|[low, _]| low), sides.map(|[_, high]| high)]
+    };
+    let width_m = (x_m[1] - x_m[0]).max(y_m[1] - y_m[0]);
+    (gap_m > 0.0).then(|| MagnetRoom {
+        boxes_m: iron.images().into_iter().map(image).collect(),
+        least_m: (LEAST_GAP * gap_m).max(width_m / MOST_ACROSS),
+    })
 }
 
 /// The pull on a magnet.
@@ -168,7 +172,7 @@ impl IronPull {
         let mut best: Option<Self> = None;
         let room = room(iron, &magnet, places_m);
         // Panels of the whole steel's size do for most; what they do not do for takes finer ones near the magnet.
-        for room in [None, Some(&room)] {
+        for room in [None].into_iter().chain(room.as_ref().map(Some)) {
             let last = last_tier(iron, room);
             if last.is_none() && best.is_some() {
                 break;

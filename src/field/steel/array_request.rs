@@ -441,7 +441,9 @@ impl<'a> ArrayRequest<'a> {
                     [c, s].map(|by| by * (shape.radius_m + distance_m))
                 })
                 .collect();
-            places.extend(DEPTHS_BESIDE.map(|part| {
+            // Places of one height have one depth.
+            let depths = usize::from(end_m < begin_m) + 1;
+            places.extend(DEPTHS_BESIDE[..depths].iter().map(|part| {
                 let z_m = begin_m - part * (begin_m - end_m);
                 Places {
                     clearance: Clearance {
