@@ -15,7 +15,7 @@ use crate::field::steel::passive::{NoPull, Region, spread};
 
 /// Share of the tolerance given to the magnet's dipoles.
 const MAGNET_SHARE: f64 = 0.1;
-/// Error that the table may add, relative to the tolerance.
+/// Error that the table may add, relative to the tolerance, or to the solution's error where that is larger.
 const TABLE_SHARE: f64 = 0.3;
 /// Attempts at the table, each with ten times less error aimed at.
 const ATTEMPTS: usize = 3;
@@ -130,7 +130,8 @@ impl RegionPull {
         let ranges = [x_m, y_m, z_m];
         let sure = self.pull.forces_n(places_m);
         let turns = symmetries_of(scene, ranges);
-        let allowed = TABLE_SHARE * wanted.tolerance;
+        // A table finer than what it holds costs hours close to large steel.
+        let allowed = TABLE_SHARE * wanted.tolerance.max(self.relative_error);
         let mut aim = allowed;
         let mut best: Option<(f64, Table)> = None;
         for _ in 0..ATTEMPTS {

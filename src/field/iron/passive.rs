@@ -58,19 +58,23 @@ impl Answer {
 
     /// The field that the steel sends back to every dipole of `magnets`, each set acting alone.
     fn induced(&self, magnets: &[Vec<Dipole>]) -> Vec<Vec<Induced>> {
-        fluxform_base::progress::poll();
         let size = self.surface.size();
         let potentials: Vec<DMatrix<f64>> = (self.images.iter())
             .map(|signs| {
-                DMatrix::from_fn(size, magnets.len(), |node, magnet| {
-                    let node = &self.surface.nodes[node];
-                    let place_m = mirrored(node, *signs, self.planes_m).place_m;
-                    let of_dipole = |dipole: &Dipole| {
-                        let d = minus(place_m, dipole.at_m);
-                        dot(dipole.moment_a_m2, d) / (4.0 * PI * norm(d).powi(3))
-                    };
-                    magnets[magnet].iter().map(of_dipole).sum()
-                })
+                let mut potentials = DMatrix::zeros(size, magnets.len());
+                let columns = potentials.as_mut_slice().par_chunks_exact_mut(size);
+                columns.zip(magnets).for_each(|(column, magnet)| {
+                    for (value, node) in column.iter_mut().zip(&self.surface.nodes) {
+                        fluxform_base::progress::poll();
+                        let place_m = mirrored(node, *signs, self.planes_m).place_m;
+                        let of_dipole = |dipole: &Dipole| {
+                            let d = minus(place_m, dipole.at_m);
+                            dot(dipole.moment_a_m2, d) / (4.0 * PI * norm(d).powi(3))
+                        };
+                        *value = magnet.iter().map(of_dipole).sum();
+                    }
+                });
+                potentials
             })
             .collect();
         let layers = self.system.solve(&potentials);
@@ -78,11 +82,12 @@ impl Answer {
             let of_dipole = |dipole: &Dipole| self.field(dipole.at_m, &layers, number);
             magnet.iter().map(of_dipole).collect()
         };
-        magnets.iter().enumerate().map(of_magnet).collect()
+        magnets.par_iter().enumerate().map(of_magnet).collect()
     }
 
     /// The field at a place of one column of the layers, [image]: [node, column].
     fn field(&self, at_m: Point, layers: &[DMatrix<f64>], column: usize) -> Induced {
+        fluxform_base::progress::poll();
         let mut sum = Induced::default();
         let [cx, cy] = self.planes_m;
         for ([sx, sy], layer) in self.images.iter().zip(layers) {
