@@ -192,7 +192,7 @@ impl SceneIron {
         Ok((coils, iron))
     }
 
-    /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` up.
+    /// Solves it with the cores of `scene`, to `tolerance`, for heights from `lowest_m` to the workspace's highest.
     ///
     /// # Errors
     /// Steel that touches in a way that is not solved; a node on a winding's edge; more steel than memory allows.
@@ -203,7 +203,8 @@ impl SceneIron {
         lowest_m: f64,
     ) -> Result<IronArray, RunError> {
         let (coils, iron) = self.bodies(scene)?;
-        IronArray::new(coils, &iron, tolerance, lowest_m).map_err(|fault| match fault {
+        let heights_m = [lowest_m, scene.design.workspace.z_m.to.max(lowest_m)];
+        IronArray::new(coils, &iron, tolerance, heights_m).map_err(|fault| match fault {
             Unsolved::OnEdge(on_edge) => on_edge.into(),
             Unsolved::TooLarge { .. } => RunError::Input(format!(
                 "the cores with [plate] and [[iron]]: {fault}; take fewer coils, place them alike about two planes, \

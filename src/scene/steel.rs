@@ -187,7 +187,10 @@ impl Solved {
         let clearance = clearance(scene, points_m, 0.0)?;
         let lowest_m = clearance.lowest_m;
         let steel_error = match (&self.steel, &scene.core) {
-            (Steel::Iron(array), _) => array.error_from(lowest_m, STEEL_SHARE * self.tolerance)?,
+            (Steel::Iron(array), _) => {
+                let heights_m = [lowest_m, clearance.highest_m];
+                array.error_between(heights_m, STEEL_SHARE * self.tolerance)?
+            }
             (Steel::Coupled(array), Some(core)) => {
                 let permeability = self.relative_permeability;
                 let request =

@@ -102,7 +102,7 @@ fn the_estimate_covers_the_difference_from_coupled_cores() {
     let positions_m = [[-0.03, 0.0], [0.03, 0.0]];
     let two = coils(&positions_m, 999.0);
     let iron = Iron::new(two, None).unwrap();
-    let array = IronArray::new(two, &iron, 3e-3, 0.02).unwrap();
+    let array = IronArray::new(two, &iron, 3e-3, [0.02, f64::INFINITY]).unwrap();
     assert!(array.relative_error <= 3e-3, "{}", array.relative_error);
     let known = CoupledArray::new(&WINDING, SHAPE, 1000.0, &positions_m, 1e-5, 0.02).unwrap();
     let currents = [1.0, -0.4];
@@ -301,7 +301,7 @@ fn more_steel_than_memory_holds_is_refused() {
     let plate = plate(Outline::Rectangle([0.6; 2]), -0.11, 0.005, 999.0);
     let refused = |places: &[[f64; 2]]| {
         let iron = Iron::new(coils(places, 999.0), Some(&plate)).unwrap();
-        match IronArray::new(coils(places, 999.0), &iron, 1e-2, 0.05) {
+        match IronArray::new(coils(places, 999.0), &iron, 1e-2, [0.05, f64::INFINITY]) {
             Err(Unsolved::TooLarge { unknowns, images }) => (unknowns, images),
             other => panic!("{:?}", other.map(|array| array.size())),
         }
@@ -387,7 +387,7 @@ fn the_largest_flux_density_is_inside_the_steel() {
             ..plate(Outline::Round(0.09), SHAPE.bottom_m - 0.001, 0.005, 999.0)
         };
         let iron = Iron::new(with, Some(&holed)).unwrap();
-        let array = IronArray::new(with, &iron, 0.05, 0.03).unwrap();
+        let array = IronArray::new(with, &iron, 0.05, [0.03, f64::INFINITY]).unwrap();
         (
             PeakSearch::new(&array, depths)
                 .peaks(&[2.0])

@@ -325,7 +325,7 @@ fn a_mesh_too_fine_is_refused() {
         core: None,
     };
     let iron = Iron::new(coils, None).unwrap().with(mesh.faces(), 9.0);
-    let refused = IronArray::new(coils, &iron, 1e-2, 2.0);
+    let refused = IronArray::new(coils, &iron, 1e-2, [2.0, f64::INFINITY]);
     let too_large =
         matches!(refused, Err(Unsolved::TooLarge { unknowns, .. }) if unknowns > 80_000);
     assert!(too_large);

@@ -93,7 +93,7 @@ fn large_steel_near_a_winding_is_right_to_its_stated_error() {
         ("box 1", Solid::Box([1.0, 1.0, 0.02]), 0.02, 1e-2),
     ] {
         let iron = below(solid, thickness, gap);
-        let array = IronArray::new(one(), &iron, tolerance, 0.01).unwrap();
+        let array = IronArray::new(one(), &iron, tolerance, [0.01, f64::INFINITY]).unwrap();
         let (stated, error) = (array.relative_error, error(&array, gap));
         // The image is that of steel without end.
         let finite = 4e-4;
@@ -116,7 +116,7 @@ fn steel_close_under_a_winding_has_its_inductance() {
         holes: Vec::new(),
     };
     let iron = Iron::new(one(), Some(&plate)).unwrap();
-    let array = IronArray::new(one(), &iron, 1e-2, 0.01).unwrap();
+    let array = IronArray::new(one(), &iron, 1e-2, [0.01, f64::INFINITY]).unwrap();
     let error = array.added_inductance_h[(0, 0)] / image_h(&COIL, gap_m) - 1.0;
     let stated = array.relative_error;
     assert!(stated <= 1e-2 && error.abs() <= 1e-3, "{stated} {error}");
@@ -141,7 +141,7 @@ fn steel_below_a_narrow_winding_is_solved() {
         turn: UPRIGHT,
     };
     let iron = Iron::of(coils, &[Piece::new(body, MU - 1.0)]).unwrap();
-    let array = IronArray::new(coils, &iron, 3e-2, 0.01).unwrap();
+    let array = IronArray::new(coils, &iron, 3e-2, [0.01, f64::INFINITY]).unwrap();
     let error = array.added_inductance_h[(0, 0)] / image_h(&coil, gap_m) - 1.0;
     let stated = array.relative_error;
     // The image is that of steel without end.

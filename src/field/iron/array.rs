@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::axial_profile::AxialProfile;
 pub use super::bodies::RESOLUTIONS;
 use super::bodies::{Coils, Iron};
-use super::face::{Node, Point, SAME_M};
+use super::clearance::is_within;
+use super::face::{Node, Panel, Point, SAME_M};
 use super::inductance::{Linkage, least_h};
 use super::panel_columns::Targets;
 use super::potential::Branch;
@@ -19,6 +20,7 @@ use crate::frame::to_cartesian;
 use crate::steel::equivalent_dipoles::ArraySources;
 use crate::winding::{OnEdge, Winding};
 use fluxform_numerics::vec3::{minus, norm};
+use std::ops::Range;
 
 /// Most entries of the matrices as they are held (1.6 GB).
 pub(super) const MOST_ENTRIES: usize = 200_000_000;
@@ -27,6 +29,8 @@ const MOST_COMPUTED: usize = 3 * MOST_ENTRIES;
 /// A mesh of more facets does not fit, whatever its shape: two in one plane are one piece, of four nodes at the second
 /// resolution.
 pub const MOST_FACETS: usize = MOST_COMPUTED.isqrt() / 2;
+/// How near to the steel resolutions are compared, in outer radii of the windings.
+const CLOSE: f64 = 0.1;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.02;
 /// Share of the tolerance given to the integration of inductances.
@@ -107,7 +111,7 @@ pub struct IronArray {
 }
 
 impl IronArray {
-    /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as memory allows:
+    /// Solves to an estimated error below `tolerance` between the heights `heights_m`, or as far as memory allows:
     /// [`IronArray::relative_error`] says what was reached.
     ///
     /// # Errors
@@ -116,7 +120,7 @@ impl IronArray {
         coils: Coils<'_>,
         iron: &Iron,
         tolerance: f64,
-        lowest_m: f64,
+        heights_m: [f64; 2],
     ) -> Result<Self, Unsolved> {
         let requested = coarsest(tolerance);
         let last = finest(iron)?;
@@ -141,7 +145,7 @@ impl IronArray {
                 }
                 other => other?,
             };
-            fine.relative_error = fine.difference(&coarse, lowest_m, tolerance)?;
+            fine.relative_error = fine.difference(&coarse, heights_m, tolerance)?;
             coarse.coarser = None;
             fine.coarser = Some(Box::new(coarse));
             coarse = fine;
@@ -262,25 +266,68 @@ impl IronArray {
         Ok(())
     }
 
-    fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+    /// Places beside the coils' axes, up to three radii above the lowest of `heights_m` or the steel, a height each.
+    /// Where all of those heights are below the steel's top, they are between its parts.
+    fn compared(&self, [lowest_m, highest_m]: [f64; 2]) -> Vec<(Clearance, Vec<Point>)> {
         let reach = self.winding.outer_radius_m;
+        let close_m = CLOSE * reach;
         let top_m = self.top_m.max(0.0);
+        let is_below = highest_m < top_m + close_m;
+        let from_m = lowest_m.max(if is_below { 0.0 } else { top_m } + close_m);
+        let faces = self.surface.whole_faces();
+        let at_height = |height: f64| {
+            let z_m = from_m + height * reach;
+            let near = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+            let all = (self.positions_m.iter())
+                .flat_map(|[x, y]| near.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]));
+            let is_clear = |at: &Point| !is_below || !self.is_within(&faces, *at, close_m);
+            let clearance = if is_below {
+                Clearance {
+                    lowest_m: z_m,
+                    highest_m: z_m,
+                    distance_m: close_m,
+                }
+            } else {
+                Clearance::above(z_m, z_m - top_m)
+            };
+            (clearance, all.filter(is_clear).collect())
+        };
+        let mut places: Vec<(Clearance, Vec<Point>)> = [0.0, 1.0, 3.0].map(at_height).into();
+        places.retain(|(clearance, points)| {
+            !points.is_empty() && (clearance.lowest_m <= highest_m || !is_below)
+        });
+        match is_below && places.is_empty() {
+            true => self.compared([lowest_m, f64::INFINITY]),
+            false => places,
+        }
+    }
+
+    /// Whether the surface, whose [`Surface::whole_faces`] are `faces`, is closer to a place than `least_m`.
+    pub(super) fn is_within(
+        &self,
+        faces: &[(Panel, Range<usize>)],
+        [x, y, z]: Point,
+        least_m: f64,
+    ) -> bool {
+        let [cx, cy] = self.planes_m;
+        self.images.iter().any(|[sx, sy]| {
+            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
+            is_within(&self.surface, faces, own, least_m)
+        })
+    }
+
+    fn difference(&self, other: &Self, heights_m: [f64; 2], tolerance: f64) -> Result<f64, OnEdge> {
         let parts = Components::Gradient;
         let mut worst = 0.0_f64;
-        for height in [0.0, 1.0, 3.0] {
-            let z_m = lowest_m.max(top_m + 0.1 * reach) + height * reach;
-            let near = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
-            let points: Vec<Point> = (self.positions_m.iter())
-                .flat_map(|[x, y]| near.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
-                .collect();
+        for (clearance, points) in self.compared(heights_m) {
             let values = |array: &Self| {
-                let sources = array.sources(Clearance::above(z_m, z_m - top_m), 0.02 * tolerance);
+                let sources = array.sources(clearance, 0.02 * tolerance);
                 let mut out = vec![0.0; self.positions_m.len() * parts.count() * points.len()];
                 sources.sample(&points, parts, &mut out);
                 out
             };
             let (fine, coarse) = (values(self), values(other));
-            let air = self.winding.field(0.0, z_m)?.gradient_norm();
+            let air = (self.winding.field(0.0, clearance.lowest_m)?).gradient_norm();
             let size = fine.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
             let pairs = fine.iter().zip(&coarse);
             let most = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
@@ -292,16 +339,16 @@ impl IronArray {
         Ok(worst.max(apart_h / size) + self.solver_error(tolerance))
     }
 
-    /// The relative error of gradients at heights from `lowest_m` up, and of inductances, of what was solved to
-    /// `tolerance`: as [`IronArray::relative_error`] has it of those from the height that it was solved for.
+    /// The relative error of gradients between the heights `heights_m`, and of inductances, of what was solved to
+    /// `tolerance`: as [`IronArray::relative_error`] has it of those that it was solved for.
     ///
     /// # Errors
     /// A place on a winding's edge.
-    pub fn error_from(&self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+    pub fn error_between(&self, heights_m: [f64; 2], tolerance: f64) -> Result<f64, OnEdge> {
         self.coarser
             .as_ref()
             .map_or(Ok(self.relative_error), |coarser| {
-                self.difference(coarser, lowest_m, tolerance)
+                self.difference(coarser, heights_m, tolerance)
             })
     }
 

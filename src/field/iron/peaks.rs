@@ -4,7 +4,6 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 use super::array::{IronArray, apart, moved};
-use super::clearance::is_within;
 use super::face::{Node, Panel, Point};
 use super::surface::mirrored;
 use crate::winding::OnEdge;
@@ -173,12 +172,7 @@ impl<'a> PeakSearch<'a> {
     /// Whether a place is as far inside the surface as that: about it a layer's field grows without bound.
     fn is_deep(&self, place_m: Point, depth_m: f64) -> bool {
         fluxform_base::progress::poll();
-        let [cx, cy] = self.array.planes_m;
-        let [x, y, z] = place_m;
-        !self.array.images.iter().any(|[sx, sy]| {
-            let own = [cx + sx * (x - cx), cy + sy * (y - cy), z];
-            is_within(&self.array.surface, &self.faces, own, DEEP * depth_m)
-        })
+        !(self.array).is_within(&self.faces, place_m, DEEP * depth_m)
     }
 
     /// From a node's place to the largest |B| about it, along the surface at the same depth.
