@@ -187,6 +187,14 @@ pub(super) fn iron_tolerance(scene: &Scene, tolerance: f64) -> f64 {
     tolerance.max(scene.tolerances.forces)
 }
 
+/// `tolerance` of the pull of a scene's steel.
+pub(super) fn tolerance_of(scene: &Scene, tolerance: f64) -> f64 {
+    match scene.iron {
+        Some(_) => iron_tolerance(scene, tolerance),
+        None => tolerance,
+    }
+}
+
 /// Over the whole workspace, so that most places of a command share it.
 fn of_iron(
     scene: &Scene,

@@ -269,7 +269,9 @@ pub fn run(
     progress.end();
     let picture = (request.picture).then(|| picture(design, &arrays, &scene.rated_currents_a()));
     drop(arrays);
-    Ok(made.report(&scene, request, sidecar, picture))
+    let mut report = made.report(&scene, request, sidecar, picture);
+    (report.warnings).extend(passive.and_then(|passive| passive.warning));
+    Ok(report)
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.
