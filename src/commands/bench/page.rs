@@ -138,8 +138,12 @@ fn cheapest_row(shape: &ShapeBench, cheapest: &Cheapest) -> Vec<Cell> {
     let verdict = if cheapest.met {
         percent(cheapest.target)
     } else {
+        let own = shape.reference.lambda_error.filter(|own| *own > 0.0);
+        let own = own.map_or_else(String::new, |own| {
+            format!(" (the refined run is off by up to {})", percent(own))
+        });
         format!(
-            "\u{25b2} {} is not reached; closest",
+            "\u{25b2} {} is not reached{own}; closest",
             percent(cheapest.target)
         )
     };

@@ -23,9 +23,9 @@ use crate::shape::document;
 )]
 #[strum(serialize_all = "lowercase")]
 pub enum Start {
-    /// nine coils with steel cores at a pitch of 50 mm
+    /// nine coils with steel cores
     Seed,
-    /// sixteen small coils in air at a pitch of 20 mm
+    /// sixteen small coils in air
     Desk,
     /// one coil in air
     Coil,

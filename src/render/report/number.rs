@@ -85,7 +85,7 @@ pub fn force(force_n: f64) -> String {
 /// A part of a whole.
 #[must_use]
 pub fn percent(part: f64) -> String {
-    if part != 0.0 && part.abs() < 1e-3 {
+    if part != 0.0 && part.abs() < 1e-5 {
         figures(part, 2)
     } else {
         format!("{} %", figures(part * 100.0, 3))
