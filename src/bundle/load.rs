@@ -27,6 +27,7 @@ use fluxform_numerics::lagrange::{Cell, locate};
 
 /// The file of the map, by far the largest.
 const MAP: &str = "map.npz";
+const POINTS: &str = "points.csv";
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
@@ -115,11 +116,11 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 impl Bundle {
-    /// The size of the map of the bundle at `path`, which is not opened, in bytes; `None` where there is none.
+    /// The sizes of map and points of the bundle at `path`, which is not opened, in bytes; `None` where there is none.
     #[must_use]
-    pub fn map_bytes(path: &Path) -> Option<u64> {
-        let map = folder_of(path).join(MAP).metadata().ok()?;
-        Some(map.len())
+    pub fn stored_bytes(path: &Path) -> Option<[u64; 2]> {
+        let size = |name: &str| Some(folder_of(path).join(name).metadata().ok()?.len());
+        Some([size(MAP)?, size(POINTS)?])
     }
 
     /// Reads and checks the bundle in a folder (or the one whose `manifest.json` is given).
@@ -329,7 +330,7 @@ pub fn bundles_below(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Parts of every bundle.
-const REQUIRED: [&str; 4] = [MAP, "points.csv", "currents.csv", "lambda.json"];
+const REQUIRED: [&str; 4] = [MAP, POINTS, "currents.csv", "lambda.json"];
 
 fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), BundleError> {
     /// Of a newer manifest only this is understood.

@@ -10,6 +10,9 @@ const BLOCK_BYTES: usize = 64 << 10;
 /// Columns of field components, T/A.
 pub const FIELD_COLUMNS: [&str; 3] = ["bx_t_per_a", "by_t_per_a", "bz_t_per_a"];
 
+/// How rows of [`write_samples`] begin.
+pub const SAMPLE_COLUMNS: [&str; 4] = ["x_m", "y_m", "z_m", "coil"];
+
 /// Columns of gradient components, T/m/A: field component, then direction.
 pub const GRADIENT_COLUMNS: [&str; 9] = [
     "dbx_dx_t_per_m_per_a",
@@ -214,8 +217,7 @@ pub fn write_samples<V: AsRef<[f64]>>(
     coils: &[i64],
     mut values: impl FnMut(usize, usize) -> V,
 ) -> io::Result<()> {
-    let names = ["x_m", "y_m", "z_m", "coil"];
-    let mut lines = Lines::begin(out, names.iter().chain(columns).copied())?;
+    let mut lines = Lines::begin(out, SAMPLE_COLUMNS.iter().chain(columns).copied())?;
     // Positions and coils are formatted once, not once a row.
     let coil_cells: Vec<Vec<u8>> = coils
         .iter()

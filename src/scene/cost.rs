@@ -28,12 +28,17 @@ const MAP_VALUE_BYTES: f64 = 16.0;
 pub const COPIES_REPLAYED: f64 = 3.6;
 /// See [`COPIES_REPLAYED`].
 pub const COPIES_VERIFIED: f64 = 5.25;
+/// Copies of a bundle's points, file and numbers.
+const COPIES_OF_POINTS: f64 = 2.3;
 /// Bytes of a component of mag_manip's field, with its text.
 const VECTOR_VALUE_BYTES: f64 = 36.0;
 /// Bytes of a force from one coil at one point, half of them its only component: computed and gathered.
 const FORCE_BYTES: f64 = 32.0;
-/// Bytes of a component of the field of one coil at one point, with its row of a table.
-const PROBE_VALUE_BYTES: f64 = 16.0;
+/// Bytes of the field of one coil at one point, and of a value of its row in columns and as text.
+const PROBE_BYTES: f64 = 145.0;
+const PROBE_JSON_BYTES: f64 = 35.0;
+/// Bytes of a point that is read.
+const PROBE_POINT_BYTES: f64 = 100.0;
 /// Bytes of a replayed position, and of the current of one coil there.
 const POSITION_BYTES: f64 = 700.0;
 const CURRENT_BYTES: f64 = 24.0;
@@ -177,6 +182,14 @@ pub struct Cost {
 /// A table of `components` over the workspace of `design`.
 #[must_use]
 pub fn of_map(design: &Design, components: Components) -> Cost {
+    let workspace = &design.workspace;
+    let samples = [workspace.x_m, workspace.y_m, workspace.z_m].map(|axis| axis.samples);
+    let coils = design.array.positions_m.len();
+    of_nodes(design, samples, coils, components)
+}
+
+/// The same on a grid of so many `samples`, of so many `coils`.
+fn of_nodes(design: &Design, samples: [usize; 3], coils: usize, components: Components) -> Cost {
     let parts = match components {
         Components::Gz => 1.1,
         Components::Force if design.magnet.tilt_deg == [0.0; 2] => 6.5,
@@ -185,10 +198,7 @@ pub fn of_map(design: &Design, components: Components) -> Cost {
         Components::Gradient => 10.2,
         Components::All => 13.2,
     };
-    let workspace = &design.workspace;
-    let samples = [workspace.x_m, workspace.y_m, workspace.z_m].map(|axis| axis.samples);
     let [x, y, z] = samples;
-    let coils = design.array.positions_m.len();
     let steel = coupled(design) || design.has_iron();
     let law = match (steel, components) {
         (false, Components::Gz) => MAP,
@@ -235,6 +245,20 @@ pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
     }
 }
 
+/// Checks the part of the map that an object needs.
+///
+/// # Errors
+/// As [`check_forces`].
+pub fn check_map(
+    design: &Design,
+    samples: [usize; 3],
+    coils: usize,
+    components: Components,
+) -> Result<(), RunError> {
+    let cost = of_nodes(design, samples, coils, components);
+    memory::within(cost.bytes, cost.what, cost.reduce).map_err(RunError::Input)
+}
+
 /// Checks the forces of `coils` coils, of so many components, at so many points: of a surface their number may not be
 /// known before.
 ///
@@ -259,12 +283,26 @@ pub fn of_replay(positions: usize, coils: usize) -> Cost {
     }
 }
 
-/// The map of the bundle at `path`, of whose bytes so many `copies` are held; `None` where there is none.
+/// The bundle at `path`, of whose map's bytes so many `copies` are held; `None` where there is none.
+#[must_use]
+pub fn of_bundle(path: &Path, copies: f64) -> Option<Cost> {
+    let [_, points] = Bundle::stored_bytes(path)?;
+    let map = of_stored_map(path, copies)?;
+    Some(Cost {
+        what: "the bundle's map and points".to_owned(),
+        bytes: map.bytes + COPIES_OF_POINTS * points as f64,
+        reduce: "calibrate with fewer nodes of [workspace] or fewer points",
+        ..map
+    })
+}
+
+/// The same of its map alone.
 #[must_use]
 pub fn of_stored_map(path: &Path, copies: f64) -> Option<Cost> {
+    let [map, _] = Bundle::stored_bytes(path)?;
     Some(Cost {
         what: "the bundle's map".to_owned(),
-        bytes: copies * Bundle::map_bytes(path)? as f64,
+        bytes: copies * map as f64,
         cpu_seconds: 0.0,
         reduce: "calibrate with fewer nodes of [workspace]",
         misses: None,
@@ -370,15 +408,16 @@ fn is_wide(design: &Design, tolerance: Option<f64>) -> bool {
     !scene.winding.is_quick_at(x_m.hypot(y_m), tolerance)
 }
 
-/// The field of every coil of `design` at `points` points, `components` numbers each.
+/// The field of every coil of `design` at `points` points, and its `json_columns` where they are printed.
 #[must_use]
-pub fn of_probe(design: &Design, points: usize, components: usize) -> Cost {
+pub fn of_probe(design: &Design, points: usize, json_columns: Option<usize>) -> Cost {
     let coils = design.array.positions_m.len();
+    let row = PROBE_BYTES + PROBE_JSON_BYTES * json_columns.unwrap_or(0) as f64;
     Cost {
         what: format!("the field of {coils} coils at {points} points"),
-        bytes: PROBE_VALUE_BYTES * product(&[coils, points, components]),
+        bytes: (PROBE_POINT_BYTES + row * coils as f64) * points as f64,
         cpu_seconds: 0.0,
-        reduce: "ask for fewer points, or for --components gz",
+        reduce: "ask for fewer points",
         misses: None,
     }
 }

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 static GRANTED: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Bytes of a triangle with its places in the index and the certificate, and of so many of them those that a finer
-/// index takes more: the peak of `discretize` at 2, 8 and 32 million triangles, to a fifth.
-const TRIANGLE_BYTES: u64 = 200;
-const FINE_INDEX_BYTES: u64 = 120;
-const FINELY_INDEXED: u64 = 1 << 22;
+/// index takes more: the peak of `discretize` at 0.1, 0.5, 2 and 8 million triangles, to a fifth.
+const TRIANGLE_BYTES: u64 = 305;
+const FINE_INDEX_BYTES: u64 = 185;
+const FINELY_INDEXED: u64 = 1 << 20;
 /// Bytes of a constraint point, with its row of a table.
 pub const POINT_BYTES: f64 = 320.0;
 
@@ -63,7 +63,12 @@ mod tests {
 
     #[test]
     fn the_peaks_that_were_measured_are_met() {
-        for (triangles, peak) in [(1_996_002, 643e6), (7_992_002, 2.19e9)] {
+        for (triangles, peak) in [
+            (100_352, 52e6),
+            (500_000, 254e6),
+            (2_000_000, 802e6),
+            (8_000_000, 2.65e9),
+        ] {
             let ratio = bytes_of(triangles) as f64 / peak;
             assert!((0.9..1.2).contains(&ratio), "{triangles}: {ratio}");
         }

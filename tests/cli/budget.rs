@@ -24,8 +24,18 @@ fn too_large_a_job_is_refused_at_once() {
     run(
         &["calibrate", "fine.toml", "shapes/flat.toml"],
         3,
-        "460 x 460 x 460 nodes",
+        "460 x 460 x 264 nodes",
     );
+    // An object that needs few of them is not refused.
+    place.write(
+        "small.toml",
+        "name = \"small\"\nprimitive = \"flat\"\nside_mm = 10\nheight_mm = 20\n\
+         [points]\nx_mm = [-5, 5, 5]\ny_mm = [-5, 5, 5]\n",
+    );
+    let args = ["calibrate", "fine.toml", "small.toml", "--no-report"];
+    place
+        .run(&[&args[..], &["--memory", "2GB"]].concat())
+        .ends(0);
     let huge = ["--vfield", "v.yaml", "--vfield-nodes", "1000000000"];
     run(
         &[&["map", SEED][..], &huge[..]].concat(),
@@ -167,6 +177,6 @@ fn regression_commands_that_read_a_bundle_took_no_notice_of_the_grant() {
         let less = ["--memory", &format!("{}kB", 3 * map / 1000)];
         place
             .run(&[command, &less].concat())
-            .says(&["the bundle's map would take about"]);
+            .says(&["the bundle's map and points would take about"]);
     }
 }

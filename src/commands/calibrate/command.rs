@@ -181,10 +181,15 @@ impl Calibrate {
         } else {
             Components::Gz
         };
+        let mut map = of_map(design, components);
+        if !options.vtk {
+            // An object may need a small part of it, which is checked with its points.
+            map.bytes = 0.0;
+        }
         allow(
             costs_of(design, &shapes, &options.lambda)
                 .into_iter()
-                .chain([of_map(design, components)]),
+                .chain([map]),
             cost_origin(&shapes),
             printer,
         )?;

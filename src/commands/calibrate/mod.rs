@@ -484,6 +484,15 @@ impl Calibration<'_> {
         let search = object.search.as_ref();
         let heights = object.heights.as_ref().unwrap_or(&object.found);
         let fine_points = &heights.discretized.points;
+        let vector = self.force().direction.is_vector();
+        if search.is_none() {
+            // The nodes are known before anything is solved.
+            needed_map::check(
+                scene,
+                vector,
+                (scene.design, fine_points, self.options.reach_m),
+            )?;
+        }
         let options = LambdaOptions {
             picture: self.options.page,
             ..self.options.lambda.clone()
@@ -504,7 +513,6 @@ impl Calibration<'_> {
         let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
         let design = gridded.as_ref().unwrap_or(scene.design);
         let grid = (design, fine_points, self.options.reach_m);
-        let vector = self.force().direction.is_vector();
         let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);

@@ -8,6 +8,7 @@ use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::cost::check_map;
 use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel::Solved;
 use crate::scene::{MAGNET_SHARE, Scene};
@@ -30,12 +31,9 @@ impl NeededMap {
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
         let mut left_out = Vec::new();
+        check(scene, vector, (design, points, reach_m))?;
         let grid = needed_grid(design, points, reach_m, &mut left_out);
-        let components = match (vector, scene.tilted()) {
-            (true, _) => Components::Force,
-            (false, true) => Components::Gradient,
-            (false, false) => Components::Gz,
-        };
+        let components = needed_components(scene, vector);
         if !scene.tilted() {
             let (what, why) = if vector {
                 (
@@ -70,6 +68,29 @@ impl NeededMap {
             components,
             left_out,
         })
+    }
+}
+
+/// Checks the memory of the part of the maps that an object needs.
+///
+/// # Errors
+/// More than granted, and what to do.
+pub(super) fn check(
+    scene: &Scene,
+    vector: bool,
+    (design, points, reach_m): (&Design, &ConstraintPoints, f64),
+) -> Result<(), RunError> {
+    let grid = needed_nodes(design, points, reach_m);
+    let samples = [grid.x_m, grid.y_m, grid.z_m].map(|nodes| nodes.len());
+    let coils = needed_coils(scene).len();
+    check_map(design, samples, coils, needed_components(scene, vector))
+}
+
+fn needed_components(scene: &Scene, vector: bool) -> Components {
+    match (vector, scene.tilted()) {
+        (true, _) => Components::Force,
+        (false, true) => Components::Gradient,
+        (false, false) => Components::Gz,
     }
 }
 

@@ -8,12 +8,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::{ProbeRequest, ProbeTable, probe};
+use super::{ProbeRequest, ProbeTable, probe, quantities};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{self, Overwrite};
-use crate::bundle::read_table::read_columns;
+use crate::bundle::table::SAMPLE_COLUMNS;
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
@@ -104,7 +104,7 @@ struct ProbeSummary {
     rows: usize,
     accuracy: BTreeMap<&'static str, StageAccuracy>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    columns: Option<BTreeMap<String, Vec<f64>>>,
+    columns: Option<BTreeMap<&'static str, Vec<f64>>>,
 }
 
 impl Probe {
@@ -141,14 +141,11 @@ impl Probe {
             overwrite.check(path).map_err(RunError::from)?;
         }
         let design = &document.design;
-        let parts = match components {
-            Components::All => 12,
-            Components::Gradient => 9,
-            Components::Gz => 1,
-            Components::Force => 3,
-        };
+        let as_json = matches!(out, FileArgument::Standard) && printer.json();
+        let quantities = || quantities(components, self.magnet_force).len();
+        let columns = as_json.then(|| SAMPLE_COLUMNS.len() + quantities());
         allow(
-            std::iter::once(of_probe(design, points, parts))
+            std::iter::once(of_probe(design, points, columns))
                 .chain(of_steel(design, self.tolerance.tolerance)),
             CostOrigin::Document,
             printer,
@@ -175,8 +172,8 @@ impl Probe {
             columns: None,
         };
         let place = match out {
-            FileArgument::Standard if printer.json() => {
-                summary.columns = Some(columns(&table)?);
+            FileArgument::Standard if as_json => {
+                summary.columns = Some(table.columns());
                 Stream::Output
             }
             out => write_to(Some(out), &overwrite, printer, |out| table.write(out))?,
@@ -224,15 +221,4 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
     let all = [Some(("field", field)), iron, force];
     let of_curve = table.of_curve.iter().cloned();
     all.into_iter().flatten().chain(of_curve).collect()
-}
-
-/// The table's columns by their names: its CSV read back, every number to the last bit.
-fn columns(table: &ProbeTable) -> Result<BTreeMap<String, Vec<f64>>, Failure> {
-    let mut csv = Vec::new();
-    table.write(&mut csv)?;
-    let header = csv.split(|b| *b == b'\n').next().unwrap_or_default();
-    let header = String::from_utf8_lossy(header).into_owned();
-    let names: Vec<&str> = header.split(',').collect();
-    let values = read_columns("the table", csv.as_slice(), &names)?;
-    Ok(names.into_iter().map(str::to_owned).zip(values).collect())
 }

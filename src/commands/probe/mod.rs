@@ -13,7 +13,9 @@ use rayon::prelude::*;
 
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed, missed_of_force};
-use crate::bundle::table::{FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, write_samples};
+use crate::bundle::table::{
+    FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, SAMPLE_COLUMNS, write_samples,
+};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
 use crate::field::magnet::MagnetRule;
@@ -517,37 +519,69 @@ impl ProbeTable {
     /// # Errors
     /// The writer's.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut columns: Vec<&str> = Vec::new();
-        if self.components == Components::All {
-            columns.extend(FIELD_COLUMNS);
-        }
-        let first = match self.components {
-            Components::Gz => 8,
-            // The tensor is symmetric: the derivatives of B_z are the others along z.
-            Components::Force => 6,
-            Components::Gradient | Components::All => 0,
-        };
-        columns.extend(&GRADIENT_COLUMNS[first..]);
-        if !self.forces.is_empty() {
-            columns.extend(FORCE_COLUMNS);
-        }
         let coils: Vec<i64> = (0..self.coils as i64).collect();
-        write_samples(
-            out,
-            &columns,
-            self.points_m.iter().copied(),
-            &coils,
-            |point, coil| {
-                let pair = point * self.coils + coil;
-                let field = &self.fields[pair];
-                let mut row = Vec::with_capacity(columns.len());
-                if self.components == Components::All {
-                    row.extend(field.field_t_per_a);
-                }
-                row.extend(&field.gradient_t_per_m_per_a.as_flattened()[first..]);
-                row.extend(self.forces.get(pair).into_iter().flatten());
-                row
-            },
-        )
+        let points_m = self.points_m.iter().copied();
+        write_samples(out, &self.quantities(), points_m, &coils, |point, coil| {
+            self.values(point * self.coils + coil)
+        })
     }
+
+    /// The table's columns by their names.
+    #[must_use]
+    pub fn columns(&self) -> BTreeMap<&'static str, Vec<f64>> {
+        let names: Vec<&str> = SAMPLE_COLUMNS
+            .into_iter()
+            .chain(self.quantities())
+            .collect();
+        let mut columns = vec![Vec::with_capacity(self.rows()); names.len()];
+        for pair in 0..self.rows() {
+            let [point, coil] = [pair / self.coils, pair % self.coils];
+            let place = self.points_m[point].into_iter().chain([coil as f64]);
+            for (column, value) in columns.iter_mut().zip(place.chain(self.values(pair))) {
+                column.push(value);
+            }
+        }
+        names.into_iter().zip(columns).collect()
+    }
+
+    fn quantities(&self) -> Vec<&'static str> {
+        quantities(self.components, !self.forces.is_empty())
+    }
+
+    /// The [`quantities`] of one row.
+    fn values(&self, row: usize) -> Vec<f64> {
+        let field = &self.fields[row];
+        let mut values = Vec::with_capacity(18);
+        if self.components == Components::All {
+            values.extend(field.field_t_per_a);
+        }
+        let derivatives = field.gradient_t_per_m_per_a.as_flattened();
+        values.extend(&derivatives[first_derivative(self.components)..]);
+        values.extend(self.forces.get(row).into_iter().flatten());
+        values
+    }
+}
+
+/// Number of the first derivative that a table has.
+fn first_derivative(components: Components) -> usize {
+    match components {
+        Components::Gz => 8,
+        // The tensor is symmetric: the derivatives of B_z are the others along z.
+        Components::Force => 6,
+        Components::Gradient | Components::All => 0,
+    }
+}
+
+/// Names of what every row of a table has beside place and coil.
+#[must_use]
+pub fn quantities(components: Components, has_forces: bool) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    if components == Components::All {
+        names.extend(FIELD_COLUMNS);
+    }
+    names.extend(&GRADIENT_COLUMNS[first_derivative(components)..]);
+    if has_forces {
+        names.extend(FORCE_COLUMNS);
+    }
+    names
 }

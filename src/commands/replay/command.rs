@@ -25,7 +25,7 @@ use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
-use crate::scene::cost::{COPIES_REPLAYED, of_replay, of_stored_map};
+use crate::scene::cost::{COPIES_REPLAYED, of_bundle, of_replay};
 
 /// More positions than this are refused.
 const MOST_POSITIONS: f64 = 1e8;
@@ -144,7 +144,7 @@ impl Replay {
             let wrong = "only one of --out, --plot and --report can go to standard output (-)";
             return Err(Failure::Usage(wrong.to_owned()));
         }
-        let map = of_stored_map(&self.bundle, COPIES_REPLAYED);
+        let map = of_bundle(&self.bundle, COPIES_REPLAYED);
         allow(map, CostOrigin::Document, printer)?;
         let opened = Opened::new(&self.bundle)?;
         let opened = if self.robust {

@@ -226,7 +226,7 @@ impl<'a> Verifier<'a> {
         progress: &dyn Progress,
     ) -> Result<VerifyReport, RunError> {
         progress.begin("verify", 5);
-        self.allow(cost::of_stored_map(path, COPIES_VERIFIED).as_slice())?;
+        self.allow(cost::of_bundle(path, COPIES_VERIFIED).as_slice())?;
         let bundle = Bundle::open(path)?;
         progress.advance(1);
         let sources = Sources::of(&bundle)?;
