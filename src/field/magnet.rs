@@ -55,17 +55,16 @@ impl Cylinder {
         self.depth_m(direction(moment_a_m2))
     }
 
-    /// The mean over the cylinder of what falls off from a plane `height_m` below its centre like
+    /// The mean over the cylinder of what falls off from the plane or ball of `sources` like
     /// the distance to the minus fourth, as a coil's gradient does at most, relative to its value
-    /// at the centre; `axis` is the cylinder's, a unit vector. Domain: height_m above
-    /// [`Cylinder::depth_m`].
+    /// at the centre; `axis` is the cylinder's, a unit vector. Domain: sources that it does not reach.
     ///
     /// An error of the field that stays below a part of the gradient at every height acts on the
     /// magnet by no more than that part times this: outside its sources it is harmonic, so
     /// that its mean is at most its largest value, whatever rule takes the mean.
     #[must_use]
-    pub fn growth(&self, height_m: f64, axis: [f64; 3]) -> f64 {
-        let part = self.depth_m(axis) / height_m;
+    pub fn growth(&self, sources: Sources, axis: [f64; 3]) -> f64 {
+        let part = sources.extent_m(*self, axis) / sources.distance_m();
         // ((1 - t)^-3 - (1 + t)^-3) / (6 t)
         let square = part * part;
         (1.0 + square / 3.0) / (1.0 - square).powi(3)
@@ -73,8 +72,8 @@ impl Cylinder {
 
     /// As [`Cylinder::growth`] for the axis along a moment.
     #[must_use]
-    pub fn growth_along(&self, height_m: f64, moment_a_m2: [f64; 3]) -> f64 {
-        self.growth(height_m, direction(moment_a_m2))
+    pub fn growth_along(&self, sources: Sources, moment_a_m2: [f64; 3]) -> f64 {
+        self.growth(sources, direction(moment_a_m2))
     }
 
     /// How far below its centre a cylinder with axis `axis` (a unit vector) extends, m.
@@ -111,9 +110,14 @@ impl Sources {
 
     /// Least distance from a cylinder's surface to a source, m; not positive where it may touch one.
     fn gap_m(self, size: Cylinder, axis: [f64; 3]) -> f64 {
+        self.distance_m() - self.extent_m(size, axis)
+    }
+
+    /// How far a cylinder reaches from its centre towards the sources at most, m.
+    fn extent_m(self, size: Cylinder, axis: [f64; 3]) -> f64 {
         match self {
-            Self::Below { height_m } => height_m - size.depth_m(axis),
-            Self::Beyond { distance_m } => distance_m - size.reach_m(),
+            Self::Below { .. } => size.depth_m(axis),
+            Self::Beyond { .. } => size.reach_m(),
         }
     }
 }

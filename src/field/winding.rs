@@ -141,7 +141,8 @@ impl Winding {
     }
 
     /// Distance from the section's rectangle, m; 0 inside.
-    pub(crate) fn distance_m(&self, r_m: f64, z_m: f64) -> f64 {
+    #[must_use]
+    pub fn distance_m(&self, r_m: f64, z_m: f64) -> f64 {
         let (lo, hi) = self.offsets_m(r_m);
         let radial = lo.max(-hi).max(0.0);
         radial.hypot(z_m.max(-self.length_m - z_m).max(0.0))

@@ -100,33 +100,32 @@ pub(crate) fn cylinder_of(design: &Design) -> Option<Cylinder> {
     }
 }
 
-/// The dipoles that stand for the magnet at heights from `lowest_m` up, where nothing that
-/// attracts it lies above `top_m`.
+/// The dipoles that stand for the magnet where what attracts it is among `sources`.
 ///
 /// # Errors
 /// A magnet that touches what it is attracted by.
 pub(crate) fn magnet_rule(
     design: &Design,
-    lowest_m: f64,
-    top_m: f64,
+    sources: Sources,
     tolerance: f64,
 ) -> Result<MagnetRule, RunError> {
     let moment_a_m2 = moment_a_m2(design);
     let Some(size) = cylinder_of(design) else {
         return Ok(MagnetRule::dipole(moment_a_m2));
     };
-    let sources = Sources::Below {
-        height_m: lowest_m - top_m,
-    };
     MagnetRule::cylinder(size, moment_a_m2, sources, tolerance).map_err(|fault| {
         let or = match fault {
             NoRule::TooClose { .. } => ", give a larger --tolerance,",
             NoRule::NotANumber | NoRule::Touches { .. } => "",
         };
+        let (place, advice) = match sources {
+            Sources::Below { .. } => ("above the highest winding or steel", "raise the magnet"),
+            Sources::Beyond { .. } => ("from the nearest winding or steel", "move it away"),
+        };
         RunError::Input(format!(
-            "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
-             {fault}; raise the magnet{or} or use model = \"dipole\"",
-            lowest_m * 1e3
+            "[magnet] model = \"cylinder\" with its centre {:.3} mm {place}: {fault}; {advice}{or} or use \
+             model = \"dipole\"",
+            sources.distance_m() * 1e3
         ))
     })
 }
@@ -287,15 +286,32 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// A magnet that touches what it is attracted by.
     pub fn magnet_rule(&self, lowest_m: f64, tolerance: f64) -> Result<MagnetRule, RunError> {
-        magnet_rule(self.design, lowest_m, self.sources_top_m(), tolerance)
+        magnet_rule(self.design, self.below(lowest_m), tolerance)
     }
 
-    /// How much larger the gradient's mean over the magnet may be than the gradient at its centre
-    /// `height_m` high; 1 for a dipole.
+    /// Windings and steel as they are seen from heights from `lowest_m` up.
     #[must_use]
-    pub fn magnet_growth(&self, height_m: f64) -> f64 {
-        let above_m = height_m - self.sources_top_m();
-        cylinder_of(self.design).map_or(1.0, |size| size.growth_along(above_m, self.moment_a_m2))
+    pub fn below(&self, lowest_m: f64) -> Sources {
+        Sources::Below {
+            height_m: lowest_m - self.sources_top_m(),
+        }
+    }
+
+    /// How much larger the gradient's mean over the magnet may be than the gradient at its centre,
+    /// with what attracts it among `sources`; 1 for a dipole.
+    #[must_use]
+    pub fn magnet_growth(&self, sources: Sources) -> f64 {
+        cylinder_of(self.design).map_or(1.0, |size| size.growth_along(sources, self.moment_a_m2))
+    }
+
+    /// Distance of a place from the nearest winding, m.
+    #[must_use]
+    pub fn windings_distance_m(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let away = |coil: &PlacedCoil| {
+            let r_m = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
+            self.winding.distance_m(r_m, z)
+        };
+        self.coils.iter().map(away).fold(f64::INFINITY, f64::min)
     }
 
     /// Height of the highest winding or steel, m.

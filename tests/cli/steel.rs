@@ -377,9 +377,77 @@ fn the_force_on_a_cylinder_has_an_error_that_its_tolerance_governs() {
     probe("0,0,0.04", "1e-12").ends(4).says(&["E403", "force"]);
     // A power of two of the gap below, the magnet's dipoles would be too many.
     probe("0,0,0.05\n0,0,0.0233", "1e-3").ends(0);
-    probe("0,0,0.05\n0,0,0.01", "1e-3")
-        .ends(3)
-        .says(&["point 2", "centre 10 mm", "-10 mm from"]);
+    probe("0,0,0.05\n0,0,0.01", "1e-3").ends(3).says(&[
+        "point 2",
+        "centre 10.000 mm",
+        "-10 mm from",
+    ]);
+}
+
+/// Below the highest core or winding it was refused however far aside: heights alone counted.
+#[test]
+fn regression_a_cylinder_beside_windings_and_raised_cores_was_refused() {
+    let place = Place::new();
+    let design = |core: &str, magnet: &str| {
+        format!(
+            "name = \"beside\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\nlength_mm = 20\n\
+             [wire]\ndiameter_mm = 0.7\n{core}[magnet]\ndiameter_mm = 10\nlength_mm = 10\n{magnet}\
+             [supply]\ncurrent_max_a = 1\n"
+        )
+    };
+    let core = "[core]\nabove_mm = 15\n";
+    let probe = |text: &str, points: &str, more: &[&str]| {
+        place.write("beside.toml", text);
+        let points = format!("x_m,y_m,z_m\n{points}");
+        let args = [&["probe", "beside.toml", "-", "--format", "json"], more].concat();
+        place.run_with_input(&args, &points).ends(0).json()
+    };
+    let column = |probe: &serde_json::Value, name: &str| -> Vec<f64> {
+        let values = probe["columns"][name].as_array().unwrap();
+        values.iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    // Middles of equal parts of the magnet, whose moment is upright: dB_z/dx over it.
+    let (x_m, z_m) = (0.034, -0.004);
+    let mut inside = String::new();
+    for layer in 0..10 {
+        for ring in 0..5 {
+            for sector in 0..16 {
+                let r = 0.005 * ((f64::from(ring) + 0.5) / 5.0).sqrt();
+                let (s, c) = (f64::from(sector) / 16.0 * std::f64::consts::TAU).sin_cos();
+                let z = z_m + 0.001 * (f64::from(layer) - 4.5);
+                inside += &format!("{},{},{z}\n", x_m + r * c, r * s);
+            }
+        }
+    }
+    let moment = -1.1579e6 * std::f64::consts::PI * 0.005_f64.powi(2) * 0.01;
+    for core in ["", core] {
+        let cylinder = design(core, "model = \"cylinder\"\n");
+        let force = ["--magnet-force", "--tolerance", "1e-3"];
+        let found = probe(&cylinder, &format!("{x_m},0,{z_m}\n0.5,0,-0.01\n"), &force);
+        let mean = |name: &str| {
+            let values = column(
+                &probe(&design(core, ""), &inside, &["--tolerance", "1e-3"]),
+                name,
+            );
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        for (felt, derivative) in [
+            ("force_x_n_per_a", "dbz_dx_t_per_m_per_a"),
+            ("force_z_n_per_a", "dbz_dz_t_per_m_per_a"),
+        ] {
+            let (felt, expected) = (column(&found, felt)[0], moment * mean(derivative));
+            assert!(
+                (felt / expected - 1.0).abs() < 4e-3,
+                "{core}{derivative}: {felt} {expected}"
+            );
+        }
+    }
+    // Where it has no room, its distance is said.
+    let points = "x_m,y_m,z_m\n0.022,0,-0.004\n";
+    let args = ["probe", "beside.toml", "-", "--magnet-force"];
+    place.write("beside.toml", &design("", "model = \"cylinder\"\n"));
+    let ran = place.run_with_input(&args, points).ends(3);
+    ran.says(&["3.000 mm from the nearest winding or steel", "move it away"]);
 }
 
 /// Two coils of the shipped design, as `design.toml`.

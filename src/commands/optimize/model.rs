@@ -4,6 +4,7 @@ use crate::RunError;
 use crate::coil::optimum::CoilModel;
 use crate::coil::optimum::task::{self, Surroundings};
 use crate::design::Design;
+use crate::field::magnet::Sources;
 use crate::scene::tolerances::Tolerances;
 use crate::scene::{MAGNET_SHARE, magnet_rule};
 
@@ -20,10 +21,12 @@ pub(super) fn coil_model(
         .core
         .as_ref()
         .map_or(0.0, |core| core.above_m.max(0.0));
+    let sources = Sources::Below {
+        height_m: design.target_height_m - top_m,
+    };
     let magnet = magnet_rule(
         design,
-        design.target_height_m,
-        top_m,
+        sources,
         MAGNET_SHARE * Tolerances::of_optimum(tolerance),
     )?;
     task::coil_model_in(design, &magnet, surroundings)

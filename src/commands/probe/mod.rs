@@ -18,7 +18,7 @@ use crate::bundle::table::{
 };
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
-use crate::field::magnet::MagnetRule;
+use crate::field::magnet::{MagnetRule, Sources};
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array_steel::SteelField;
 use crate::progress::Progress;
@@ -26,7 +26,7 @@ use crate::scene::evaluation_sample::{Evaluation, sharper_forces};
 use crate::scene::steel;
 use crate::scene::steel::{Solved, clearance_of_m};
 use crate::scene::tolerances::MAGNET_FINEST;
-use crate::scene::{MAGNET_SHARE, Scene};
+use crate::scene::{MAGNET_SHARE, Scene, magnet_rule};
 
 /// Field and gradient per ampere, coil by coil within a point.
 #[derive(Debug, Clone)]
@@ -213,7 +213,7 @@ fn force_error(
     let (mut growth, mut evaluation) = (1.0_f64, 0.0_f64);
     for (group, rule) in groups {
         if let Some(rule) = rule {
-            growth = growth.max(scene.magnet_growth(group.magnet_lowest_m));
+            growth = growth.max(scene.magnet_growth(group.sources));
             let proven = solved.force_evaluation(rule.amplification(), rule.bound());
             evaluation = evaluation.max(proven);
         }
@@ -239,8 +239,8 @@ struct Group {
     rows: Vec<usize>,
     /// Of every row's point.
     clearance: Clearance,
-    /// Height that no row's point is below, for the magnet.
-    magnet_lowest_m: f64,
+    /// Where windings and steel are, seen from the magnet.
+    sources: Sources,
 }
 
 /// The points by powers of two of their distance from the nearest core and of the gap between
@@ -280,7 +280,7 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 3], Gro
                 highest_m,
                 distance_m,
             },
-            magnet_lowest_m: above_m.unwrap_or(top_m),
+            sources: scene.below(above_m.unwrap_or(top_m)),
         });
         group.rows.push(row);
     }
@@ -288,7 +288,7 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 3], Gro
 }
 
 /// The groups with the dipoles that stand for the magnet there. Where a group's lowest height leaves too small a gap,
-/// every row of it has those of its own.
+/// every row of it has those of its own, where it is beside windings and steel by its distance from them.
 ///
 /// # Errors
 /// A magnet that touches the array, or is too close for the tolerance, with the number of its point.
@@ -300,22 +300,41 @@ fn with_rules(
 ) -> Result<Vec<(Group, Option<MagnetRule>)>, RunError> {
     let mut ready = Vec::new();
     for group in groups.into_values() {
-        if let Ok(rule) = scene.magnet_rule(group.magnet_lowest_m, finest) {
+        if let Ok(rule) = magnet_rule(scene.design, group.sources, finest) {
             ready.push((group, Some(rule)));
             continue;
         }
         for &row in &group.rows {
-            let magnet_lowest_m = points_m[row][2];
-            let rule = scene.magnet_rule(magnet_lowest_m, finest);
+            let at_m = points_m[row];
+            let above = scene.below(at_m[2]);
+            let mut own = Group {
+                rows: vec![row],
+                sources: above,
+                ..group
+            };
+            let mut rule = magnet_rule(scene.design, above, finest);
+            if rule.is_err() {
+                let steel_m = clearance_of_m(scene, row + 1, at_m, 0.0)?;
+                let distance_m = match scene.steel_extent_m() {
+                    Some(_) => steel_m.min(scene.windings_distance_m(at_m)),
+                    None => scene.windings_distance_m(at_m),
+                };
+                let beside = Sources::Beyond { distance_m };
+                let found = magnet_rule(scene.design, beside, finest);
+                if found.is_ok() || above.distance_m() <= 0.0 {
+                    rule = found;
+                    own.sources = beside;
+                    own.clearance = Clearance {
+                        lowest_m: at_m[2],
+                        highest_m: at_m[2],
+                        distance_m: steel_m,
+                    };
+                }
+            }
             let rule = rule.map_err(|fault| match fault {
                 RunError::Input(why) => RunError::Input(format!("point {}: {why}", row + 1)),
                 other => other,
             })?;
-            let own = Group {
-                rows: vec![row],
-                magnet_lowest_m,
-                ..group
-            };
             ready.push((own, Some(rule)));
         }
     }
