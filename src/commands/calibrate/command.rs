@@ -27,10 +27,10 @@ use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{AtFlag, CriterionFlags, costs_of, rendered, well_placed};
-use crate::design::Need;
 use crate::design::message_text::shown_path;
+use crate::design::{Design, Need};
 use crate::scene::cached_field::SteelPart;
-use crate::scene::cost::{Components, of_map, of_steel};
+use crate::scene::cost::{self, Components, of_map, of_steel};
 use crate::scene::shard::Shard;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::tolerances::ErrorTarget;
@@ -174,22 +174,10 @@ impl Calibrate {
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
             printer.summary(Stream::Output, plan, || explained(plan))?;
         }
-        let components = if options.vtk {
-            Components::All
-        } else if options.requests_vector(&shapes) {
-            Components::Force
-        } else {
-            Components::Gz
-        };
-        let mut map = of_map(design, components);
-        if !options.vtk {
-            // An object may need a small part of it, which is checked with its points.
-            map.bytes = 0.0;
-        }
         allow(
             costs_of(design, &shapes, &options.lambda)
                 .into_iter()
-                .chain([map]),
+                .chain([map_cost(design, &shapes, &options)]),
             cost_origin(&shapes),
             printer,
         )?;
@@ -334,4 +322,21 @@ fn warn(report: &CalibrateReport, printer: &Printer) {
             printer.warning(&format!("{shape}: {warning}"));
         }
     }
+}
+
+/// The map of the whole workspace.
+fn map_cost(design: &Design, shapes: &[ShapeSource], options: &CalibrateOptions) -> cost::Cost {
+    let components = if options.vtk {
+        Components::All
+    } else if options.requests_vector(shapes) {
+        Components::Force
+    } else {
+        Components::Gz
+    };
+    let mut map = of_map(design, components);
+    if !options.vtk {
+        // An object may need a small part of it, which is checked with its points.
+        map.bytes = 0.0;
+    }
+    map
 }

@@ -465,11 +465,19 @@ impl Calibration<'_> {
         let document = search
             .as_ref()
             .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
-        Ok(ObjectPoints {
+        let object = ObjectPoints {
             found: opened.discretize_cached(("points", document, true), self.field, progress)?,
             heights: self.heights(&opened, search.as_ref(), progress)?,
             search,
-        })
+        };
+        if object.search.is_none() {
+            // The map's nodes are known before anything is solved.
+            let heights = object.heights.as_ref().unwrap_or(&object.found);
+            let points = &heights.discretized.points;
+            let about = (self.scene.design, points, self.options.reach_m);
+            needed_map::check(self.scene, self.force().direction.is_vector(), about)?;
+        }
+        Ok(object)
     }
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
@@ -484,15 +492,6 @@ impl Calibration<'_> {
         let search = object.search.as_ref();
         let heights = object.heights.as_ref().unwrap_or(&object.found);
         let fine_points = &heights.discretized.points;
-        let vector = self.force().direction.is_vector();
-        if search.is_none() {
-            // The nodes are known before anything is solved.
-            needed_map::check(
-                scene,
-                vector,
-                (scene.design, fine_points, self.options.reach_m),
-            )?;
-        }
         let options = LambdaOptions {
             picture: self.options.page,
             ..self.options.lambda.clone()
@@ -513,6 +512,7 @@ impl Calibration<'_> {
         let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
         let design = gridded.as_ref().unwrap_or(scene.design);
         let grid = (design, fine_points, self.options.reach_m);
+        let vector = self.force().direction.is_vector();
         let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
