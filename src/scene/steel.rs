@@ -179,23 +179,27 @@ impl Solved {
         })
     }
 
-    /// The same solution, made for places anywhere, with the error that it has at `points_m`.
+    /// The same solution, made for places anywhere, with the error that it has at groups of places with `clearances`.
     ///
     /// # Errors
-    /// A point on the steel or hardly off it; a place on a winding's edge.
-    pub(crate) fn at_points(self, scene: &Scene, points_m: &[[f64; 3]]) -> Result<Self, RunError> {
-        let clearance = clearance(scene, points_m, 0.0)?;
-        let lowest_m = clearance.lowest_m;
+    /// A place on a winding's edge.
+    pub(crate) fn for_groups(
+        self,
+        scene: &Scene,
+        clearances: &[Clearance],
+    ) -> Result<Self, RunError> {
+        let lowest_m = (clearances.iter()).fold(f64::INFINITY, |z, group| z.min(group.lowest_m));
+        let highest_m =
+            (clearances.iter()).fold(f64::NEG_INFINITY, |z, group| z.max(group.highest_m));
         let steel_error = match (&self.steel, &scene.core) {
             (Steel::Iron(array), _) => {
-                let heights_m = [lowest_m, clearance.highest_m];
-                array.error_between(heights_m, STEEL_SHARE * self.tolerance)?
+                array.error_between([lowest_m, highest_m], STEEL_SHARE * self.tolerance)?
             }
             (Steel::Coupled(array), Some(core)) => {
                 let permeability = self.relative_permeability;
                 let request =
                     request(scene, core, permeability, self.tolerance, f64::NEG_INFINITY)?;
-                request.error_at(array, clearance)?
+                request.error_at(array, clearances)?
             }
             _ => self.steel_error,
         };

@@ -24,7 +24,7 @@ use crate::field::steel::array_steel::SteelField;
 use crate::progress::Progress;
 use crate::scene::evaluation_sample::{Evaluation, sharper_forces};
 use crate::scene::steel;
-use crate::scene::steel::{Solved, clearance_of_m};
+use crate::scene::steel::{Solved, clearance, clearance_of_m};
 use crate::scene::tolerances::MAGNET_FINEST;
 use crate::scene::{MAGNET_SHARE, Scene, magnet_rule};
 
@@ -95,8 +95,8 @@ pub fn probe(
 ) -> Result<ProbeTable, RunError> {
     finite(&points_m)?;
     let scene = Scene::with_tolerance(design, request.tolerance)?;
-    let solved = solve_anywhere(&scene, &points_m)?;
     let groups = groups(&scene, &points_m)?;
+    let solved = solve_anywhere(&scene, groups.values(), &points_m)?;
     progress.begin("probe", points_m.len() as u64);
     let coils = scene.coils.len();
     let mut fields = vec![CartesianField::default(); points_m.len() * coils];
@@ -176,16 +176,24 @@ fn finite(points_m: &[[f64; 3]]) -> Result<(), RunError> {
     )))
 }
 
-/// The steel of `scene` for `points_m`.
+/// The steel of `scene` for `groups` of `points_m`.
 ///
 /// A value depends on its own point alone: neither the solution nor how it is evaluated may depend on where
 /// the other points are. What is stated of them all may.
 ///
 /// # Errors
 /// As [`steel::solve`].
-fn solve_anywhere(scene: &Scene, points_m: &[[f64; 3]]) -> Result<Solved, RunError> {
+fn solve_anywhere<'a>(
+    scene: &Scene,
+    groups: impl Iterator<Item = &'a Group>,
+    points_m: &[[f64; 3]],
+) -> Result<Solved, RunError> {
     let solved = steel::solve(scene, scene.tolerances.field, f64::NEG_INFINITY)?;
-    solved.at_points(scene, points_m)
+    let clearances = groups.map(|group| {
+        let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
+        clearance(scene, &own, 0.0)
+    });
+    solved.for_groups(scene, &clearances.collect::<Result<Vec<_>, RunError>>()?)
 }
 
 /// The error of the field.

@@ -383,7 +383,7 @@ impl<'a> ArrayRequest<'a> {
 
     /// The height below which places are close to the cores, m.
     fn close_m(&self) -> f64 {
-        self.shape.top_m.max(0.0) + CLOSE * self.shape.radius_m
+        self.shape.top_m + CLOSE * self.shape.radius_m
     }
 
     /// Of the places by which a resolution is chosen: where they may be anywhere, above the array.
@@ -396,22 +396,28 @@ impl<'a> ArrayRequest<'a> {
         }
     }
 
-    /// The error that `array`, which this request was solved as, has at places with `clearance`: more than
+    /// The error that `array`, which this request was solved as, has at groups of places with `clearances`: more than
     /// stated by itself where they are close to the cores.
     ///
     /// # Errors
     /// A node of the outline on the winding's edge.
-    pub fn error_at(&self, array: &CoupledArray, clearance: Clearance) -> Result<f64, OnEdge> {
-        if clearance.lowest_m >= self.close_m() {
-            return Ok(array.relative_error);
+    pub fn error_at(&self, array: &CoupledArray, clearances: &[Clearance]) -> Result<f64, OnEdge> {
+        let close = clearances.iter().filter(|c| c.lowest_m < self.close_m());
+        let close: Vec<Clearance> = close.copied().collect();
+        let mut error = array.relative_error;
+        if close.is_empty() {
+            return Ok(error);
         }
         let [coarse, _] = self.resolutions(array.refinement);
         let coarse = self.attempt(array.refinement, &coarse, &self.first_block())?;
-        let (drives, about) = self.compared(clearance);
-        let compared = (&drives[..], &about[..]);
-        let places = self.places(clearance);
-        let error = array.difference(&coarse.array, compared, &places, self.tolerance)?;
-        Ok(error.max(array.relative_error))
+        for clearance in close {
+            let (drives, about) = self.compared(clearance);
+            let compared = (&drives[..], &about[..]);
+            let places = self.places(clearance);
+            let of_group = array.difference(&coarse.array, compared, &places, self.tolerance)?;
+            error = error.max(of_group);
+        }
+        Ok(error)
     }
 
     /// Where two resolutions are compared for places with `clearance`: above the array, and beside the cores
@@ -419,7 +425,7 @@ impl<'a> ArrayRequest<'a> {
     fn places(&self, clearance: Clearance) -> Vec<Places> {
         let shape = self.shape;
         let distance_m = clearance.distance_m.max(CLOSEST * shape.radius_m);
-        let lowest_m = clearance.lowest_m.max(shape.top_m.max(0.0) + distance_m);
+        let lowest_m = clearance.lowest_m.max(shape.top_m + distance_m);
         let reach_m = self.winding.outer_radius_m;
         let mut places = Vec::new();
         let above = Places {

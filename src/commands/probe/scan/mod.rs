@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::solve_anywhere;
+use super::{groups, solve_anywhere};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -120,7 +120,8 @@ pub fn compare(
     }
     // As `probe` does: a fit moves the places, and what `probe` printed must be found again to the last
     // digits.
-    let solved = solve_anywhere(&scene, &scan.positions_m)?;
+    let groups = groups(&scene, &scan.positions_m)?;
+    let solved = solve_anywhere(&scene, groups.values(), &scan.positions_m)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;

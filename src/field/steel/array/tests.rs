@@ -416,13 +416,51 @@ fn regression_no_error_was_estimated_beside_the_shafts_of_coupled_cores() {
         lowest_m: f64::NEG_INFINITY,
     };
     let array = anywhere.solve(&NoCache).unwrap();
-    let stated = anywhere.error_at(&array, clearance).unwrap();
+    let stated = anywhere.error_at(&array, &[clearance]).unwrap();
     let found = off(&array);
     assert!(
         array.relative_error < found && found < stated,
         "{found:e}, {stated:e} stated"
     );
     let above = Clearance::above(0.01, 0.003);
-    let far = anywhere.error_at(&array, above).unwrap();
+    let far = anywhere.error_at(&array, &[above]).unwrap();
     assert_eq!(far.to_bits(), array.relative_error.to_bits());
+}
+
+/// Over cores that end below the windings' tops two resolutions were compared above the windings alone.
+#[test]
+fn regression_no_error_was_estimated_in_the_bores_over_low_cores() {
+    let (winding, raised, positions_m) = raised();
+    let shape = CoreShape {
+        top_m: -0.0075,
+        ..raised
+    };
+    let distance_m = 0.07 * shape.radius_m;
+    let z_m = shape.top_m + distance_m;
+    let clearance = Clearance {
+        lowest_m: z_m,
+        highest_m: z_m,
+        distance_m,
+    };
+    let request = |tolerance: f64| ArrayRequest {
+        winding: &winding,
+        shape,
+        relative_permeability: 120.0,
+        positions_m: &positions_m,
+        tolerance,
+        lowest_m: f64::NEG_INFINITY,
+    };
+    let of = |array: &CoupledArray| {
+        let sources = ArraySources::of_array(array, clearance, 1e-8);
+        beside(&sources, 0.77 * shape.radius_m, z_m)
+    };
+    let truth = of(&request(1e-6).solve(&NoCache).unwrap());
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let array = request(tolerance).solve(&NoCache).unwrap();
+        let stated = request(tolerance).error_at(&array, &[clearance]).unwrap();
+        let off = largest(of(&array).iter().zip(&truth).map(|(a, b)| a - b));
+        let found = off / largest(truth.iter().copied());
+        assert!(found < stated, "{tolerance}: {found:e}, {stated:e} stated");
+        assert!(stated < 2.0 * tolerance, "{tolerance}: {stated:e}");
+    }
 }
