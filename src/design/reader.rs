@@ -7,7 +7,7 @@
 //! checks that follow stay silent about it. Such a number never leaves the room, because a
 //! document with an error yields no value.
 
-use std::cell::RefCell;
+use std::cell::{LazyCell, RefCell};
 use std::ops::Range;
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub struct Sink {
     assumed: RefCell<Vec<Assumed>>,
     keys: Option<Keys>,
     /// Every key of such documents, for advice.
-    all_keys: Option<fn() -> Vec<Key>>,
+    all_keys: Option<LazyCell<Vec<Key>>>,
 }
 
 impl Sink {
@@ -79,7 +79,7 @@ pub fn read_document<T>(
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = parsed(text);
     let sink = Sink {
-        all_keys: Some(all_keys),
+        all_keys: Some(LazyCell::new(all_keys)),
         ..Sink::default()
     };
     match other_notation(text) {
@@ -399,8 +399,8 @@ impl<'a> Section<'a> {
 
     /// The sections that have a key of this `name`.
     fn sections_with(&self, name: &str) -> Vec<String> {
-        let all = self.sink.all_keys.map_or_else(Vec::new, |keys| keys());
-        let homes = all.into_iter().filter(|key| key.name == name);
+        let all = self.sink.all_keys.as_deref().into_iter().flatten();
+        let homes = all.filter(|key| key.name == name);
         homes.map(|key| section_name(&key.section)).collect()
     }
 
