@@ -130,7 +130,7 @@ impl RegionPull {
         let ranges = [x_m, y_m, z_m];
         let sure = self.pull.forces_n(places_m);
         let turns = symmetries_of(scene, ranges);
-        // A table finer than what it holds costs hours close to large steel.
+        // A table finer than what it holds only costs time.
         let allowed = TABLE_SHARE * wanted.tolerance.max(self.relative_error);
         let mut aim = allowed;
         let mut best: Option<(f64, Table)> = None;

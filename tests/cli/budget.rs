@@ -26,6 +26,27 @@ fn too_large_a_job_is_refused_at_once() {
         3,
         "460 x 460 x 264 nodes",
     );
+    // One component was counted where whole tensors are held, and no column of JSON.
+    let mut points = "x_m,y_m,z_m\n".to_owned();
+    (0..20_000).for_each(|k| points += &format!("0.001,0.002,{:.4}\n", 0.01 + 1e-6 * f64::from(k)));
+    place.write("many.csv", &points);
+    for more in [&["--out", "-"][..], &["--format", "json"]] {
+        let args = [
+            "probe",
+            SEED,
+            "many.csv",
+            "--components",
+            "gz",
+            "--memory",
+            "20MB",
+        ];
+        let ran = place.run(&[&args[..], more].concat()).ends(3);
+        assert!(
+            ran.err.contains("at 20000 points would take"),
+            "{}",
+            ran.err
+        );
+    }
     // An object that needs few of them is not refused.
     place.write(
         "small.toml",

@@ -348,11 +348,6 @@ fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
     place.write("cores.toml", &array(15, "[core]", 100.0));
     let plate = "[plate]\nthickness_mm = 3.0\nx_mm = 160.0\ny_mm = 160.0\ngap_mm = 0.5\n";
     place.write("plate.toml", &array(3, &format!("[core]\n{plate}"), 100.0));
-    // Half a millimetre under a magnet that lies: thousands of dipoles stand for it.
-    let lying = "[magnet]\ntilt_deg = [90.0, 0.0]\nmodel = \"cylinder\"\npassive_force = true\n\
-                 [workspace]\nx_mm = [-5.0, 5.0, 2]\ny_mm = [-5.0, 5.0, 2]\nz_mm = [5.5, 6.0, 2]\n\
-                 [[iron]]\nshape = \"box\"\nsize_mm = [60.0, 60.0, 10.0]\ncenter_mm = [0.0, 0.0, -6.0]\n";
-    place.write("lying.toml", &array(1, lying, 0.8));
     for args in [
         &["lambda", "air.toml", "wide.toml"][..],
         &["calibrate", "cores.toml", "wide.toml", "--out", "cores"],
@@ -384,7 +379,6 @@ fn a_signal_ends_large_arrays_plates_searches_and_requested_errors() {
     ] {
         stops(&place, args, &[300, 1900]);
     }
-    stops(&place, &["map", "lying.toml", "--out", "pull"], &[5000]);
 }
 
 /// A stop of a search of arrays: the best so far is in every file that was requested.

@@ -131,6 +131,8 @@ mod tests {
         assert_eq!(force(0.0135874), "13.59 mN");
         assert_eq!(percent(0.164_94), "16.5 %");
         assert_eq!(percent(1.24e-7), "1.2e-7");
+        // Beside shares of a per cent in one column it was 0.00026.
+        assert_eq!(percent(2.6e-4), "0.026 %");
         assert_eq!(lambda(None), "none");
     }
 }
