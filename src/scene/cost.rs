@@ -17,7 +17,7 @@ use crate::field::steel::array::closest_m;
 use crate::field::steel::array_cost::ArrayCost;
 use crate::field::steel::passive::coupling_tolerance;
 pub use crate::map::Components;
-use crate::shape::document::{AxisRequest, ShapeDocument};
+use crate::shape::document::ShapeDocument;
 use crate::shape::memory::{self, POINT_BYTES};
 use fluxform_base::uncertainty::Uncertainty;
 use std::path::Path;
@@ -57,6 +57,7 @@ struct Law {
     reduce: &'static str,
 }
 
+const FEWER_POINTS: &str = "ask for fewer points (x_mm and y_mm under [points], or --grid)";
 const FEWER: &str = "fewer points or coils take less";
 /// By batches, in air (`fluxform-bench --scaling --law forces:points`).
 const FORCES: Law = Law {
@@ -231,16 +232,31 @@ pub fn of_vector_field(design: &Design, nodes: usize) -> Cost {
 /// The points of a shape, and their forces from `coils` coils.
 #[must_use]
 pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
-    let samples = [shape.grid.x, shape.grid.y].map(|axis| match axis {
-        AxisRequest::Given(axis) => axis.samples,
-        AxisRequest::Extent(samples) => samples,
-    });
+    let samples = [shape.grid.x, shape.grid.y].map(|axis| axis.samples());
     let [x, y] = samples;
     Cost {
         what: format!("the {x} x {y} points of {:?}", shape.name),
         bytes: (POINT_BYTES + FORCE_BYTES * coils as f64) * product(&samples),
         cpu_seconds: 0.0,
-        reduce: "ask for fewer points (x_mm and y_mm under [points], or --grid)",
+        reduce: FEWER_POINTS,
+        misses: None,
+    }
+}
+
+/// The forces of `shapes`' objects, each at the points of all, of so many bytes a point and object.
+#[must_use]
+pub fn of_comparison(shapes: &[&ShapeDocument], coils: usize, bytes: usize) -> Cost {
+    let points =
+        |shape: &&ShapeDocument| product(&[shape.grid.x.samples(), shape.grid.y.samples()]);
+    let each = 0.5 * POINT_BYTES + (3 * size_of::<f64>() * coils + bytes * shapes.len()) as f64;
+    Cost {
+        what: format!(
+            "the forces of {} objects at the points of all",
+            shapes.len()
+        ),
+        bytes: each * shapes.iter().map(points).sum::<f64>(),
+        cpu_seconds: 0.0,
+        reduce: FEWER_POINTS,
         misses: None,
     }
 }

@@ -50,7 +50,8 @@ pub fn within(bytes: f64, what: impl Display, advice: &str) -> Result<(), String
     ))
 }
 
-fn bytes_of(triangles: u64) -> u64 {
+/// Memory that so many triangles take, bytes.
+pub(crate) fn bytes_of(triangles: u64) -> u64 {
     let fine = FINE_INDEX_BYTES * triangles.min(FINELY_INDEXED);
     triangles
         .saturating_mul(TRIANGLE_BYTES)

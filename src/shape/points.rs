@@ -222,12 +222,12 @@ pub fn discretize(
     discretize_with(document, &Settings::default(), progress)
 }
 
-/// The region that a document asks for, as a grid.
+/// The region that a document asks for, as a grid on its surface.
 ///
 /// # Errors
 /// [`ShapeError::Document`] for axes that do not ascend or have too many points, or more than memory is granted for.
-pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid, ShapeError> {
-    let [x, y] = bounds.plan();
+pub fn requested_grid(document: &ShapeDocument, surface: &Surface) -> Result<Grid, ShapeError> {
+    let [x, y] = surface.extent().plan();
     let grid = Grid {
         x_m: axis("x", document.grid.x, x)?,
         y_m: axis("y", document.grid.y, y)?,
@@ -239,9 +239,13 @@ pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid,
             grid.x_m.samples, grid.y_m.samples
         )));
     }
-    let what = format_args!("the {} x {} points", grid.x_m.samples, grid.y_m.samples);
+    let what = format_args!(
+        "the surface and {} x {} points",
+        grid.x_m.samples, grid.y_m.samples
+    );
     let advice = "ask for fewer points, or for a larger error";
-    memory::within(POINT_BYTES * count as f64, what, advice).map_err(ShapeError::Document)?;
+    let bytes = surface.held_bytes() + POINT_BYTES * count as f64;
+    memory::within(bytes, what, advice).map_err(ShapeError::Document)?;
     Ok(grid)
 }
 
@@ -269,15 +273,14 @@ pub fn discretize_surface(
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
     progress.check()?;
-    let bounds = surface.extent();
-    let grid = requested_grid(document, &bounds)?;
+    let grid = requested_grid(document, surface)?;
     let mut samples = surface.heights(&grid, progress)?;
     let found = holes::holes(&grid, &samples);
     if !found.is_empty() {
         warnings.push(treat_holes(settings.holes, &grid, &mut samples, &found)?);
     }
     let rounding_m = surface.height_rounding_m();
-    let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
+    let mut points = collect(&grid, &samples, rounding_m, &surface.extent())?;
     points.holes = found.len();
     let hidden = if settings.marks {
         add_marks(
@@ -318,7 +321,7 @@ pub fn discretize_surface(
     };
     Ok(Discretized {
         points,
-        bounds,
+        bounds: surface.extent(),
         mesh,
         read_by,
         accuracy,

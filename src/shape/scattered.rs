@@ -66,6 +66,8 @@ impl Scattered {
 pub struct Probe<'a> {
     kind: Kind<'a>,
     plan_m: Rect,
+    /// Of the surface, with its index.
+    held_bytes: f64,
 }
 
 enum Kind<'a> {
@@ -109,6 +111,7 @@ impl<'a> Probe<'a> {
         };
         Self {
             kind,
+            held_bytes: surface.held_bytes(),
             plan_m: Rect {
                 low_m: plan.map(|[low, _]| low),
                 high_m: plan.map(|[_, high]| high),
@@ -269,16 +272,16 @@ impl<'a> Probe<'a> {
             }
         }
     }
-}
 
-/// Checks a number of points that is needed at least.
-fn check_count(points: usize, advice: &str) -> Result<(), ShapeError> {
-    if points > MOST_POINTS {
-        return Err(ShapeError::Document(format!(
-            "more than {MOST_POINTS} points would be needed; {advice}"
-        )));
+    /// Checks a number of points that is needed at least, beside the surface.
+    fn check_count(&self, points: usize, advice: &str) -> Result<(), ShapeError> {
+        if points > MOST_POINTS {
+            return Err(ShapeError::Document(format!(
+                "more than {MOST_POINTS} points would be needed; {advice}"
+            )));
+        }
+        let bytes = self.held_bytes + POINT_BYTES * points as f64;
+        let what = format_args!("the surface and {points} points");
+        memory::within(bytes, what, advice).map_err(ShapeError::Document)
     }
-    let bytes = POINT_BYTES * points as f64;
-    let what = format_args!("choosing {points} points");
-    memory::within(bytes, what, advice).map_err(ShapeError::Document)
 }

@@ -111,6 +111,14 @@ impl Surface {
         Ok((Self::Mesh(mesh), warnings))
     }
 
+    /// Memory that the surface takes with its index and the certificate of its points, bytes.
+    pub(crate) fn held_bytes(&self) -> f64 {
+        match self {
+            Self::Mesh(mesh) => memory::bytes_of(mesh.triangles().len() as u64) as f64,
+            Self::Primitive(_) => 0.0,
+        }
+    }
+
     /// The box around the surface, m.
     #[must_use]
     pub fn extent(&self) -> Bounds {

@@ -111,6 +111,27 @@ fn the_pull_of_hundreds_of_coupled_cores_is_refused_before_it_is_computed() {
     }
 }
 
+/// Each object was counted alone, and none of the forces at the others' points.
+#[test]
+fn objects_that_are_compared_are_counted_together() {
+    let place = Place::new();
+    for (name, height_mm) in [("low", 40), ("high", 50)] {
+        let points = "[points]\nx_mm = [-50, 50, 300]\ny_mm = [-50, 50, 300]\n";
+        let flat = format!(
+            "name = \"{name}\"\nprimitive = \"flat\"\nside_mm = 100\nheight_mm = {height_mm}\n{points}"
+        );
+        place.write(&format!("{name}.toml"), &flat);
+    }
+    let args = ["compare", SEED, "low.toml", "high.toml", "--memory", "90MB"];
+    let ran = place.run(&args).ends(3);
+    assert!(
+        ran.err
+            .contains("the forces of 2 objects at the points of all"),
+        "{}",
+        ran.err
+    );
+}
+
 /// The plan of 100 x 100 cores solved the whole array, and said nothing for minutes.
 #[test]
 fn a_plan_solves_no_array() {

@@ -432,14 +432,44 @@ fn a_distance_that_is_not_certified_of_a_formula_is_a_warning() {
 #[test]
 fn a_surface_that_takes_more_memory_than_granted_is_refused_before_it_is_made() {
     let place = Place::new();
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, 3000, 3000);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(&vec![70; 9_000_000]).unwrap();
-    writer.finish().unwrap();
-    place.write("large.png", &bytes);
+    let image = |name: &str, side: u32| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, side, side);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().unwrap();
+        writer
+            .write_image_data(&vec![70; (side * side) as usize])
+            .unwrap();
+        writer.finish().unwrap();
+        place.write(name, &bytes);
+    };
+    image("large.png", 3000);
+    // Of its 160 MB and 115 MB of points each was granted alone.
+    image("middling.png", 400);
+    let args = [
+        "discretize",
+        "middling.png",
+        "--unit",
+        "mm",
+        "--scale",
+        "0.1",
+        "--out",
+        "-",
+        "--memory",
+        "200MB",
+    ];
+    let ran = place
+        .run(&[&args[..], &["--grid", "600x600"]].concat())
+        .ends(3);
+    assert!(
+        ran.err.contains("the surface and 600 x 600 points"),
+        "{ran:?}"
+    );
+    let ran = place
+        .run(&[&args[..], &["--poisson", "0.05"]].concat())
+        .ends(3);
+    assert!(ran.err.contains("the surface and"), "{ran:?}");
     let args = [
         "discretize",
         "large.png",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::page::refined_error;
 use super::{BenchRequest, Estimate, MEASURED, run};
 use crate::bundle::bench::{BenchFile, Cheapest, ShapeBench};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
@@ -232,14 +233,8 @@ fn named(shape: &ShapeBench, cheapest: &Cheapest) -> String {
     let verdict = if cheapest.met {
         String::new()
     } else {
-        let own = shape.reference.lambda_error.filter(|own| *own > 0.0);
-        let own = own.map_or_else(String::new, |own| {
-            format!(", and the refined run by up to {}", percent(own))
-        });
-        format!(
-            "not reached; the closest is off by {}{own}: ",
-            percent(run.error())
-        )
+        let (error, own) = (percent(run.error()), refined_error(shape));
+        format!("not reached; the closest is off by {error}{own}: ")
     };
     format!(
         "{verdict}{} of processor time\n{}",

@@ -133,18 +133,23 @@ fn cell(error: Option<f64>) -> Cell {
         .into()
 }
 
+/// What the refined run's own error adds to those held against it, in words; nothing for a run without one.
+pub(super) fn refined_error(shape: &ShapeBench) -> String {
+    let own = shape.reference.lambda_error.filter(|own| *own > 0.0);
+    own.map_or_else(String::new, |own| {
+        format!(" (the refined run is off by up to {})", percent(own))
+    })
+}
+
 fn cheapest_row(shape: &ShapeBench, cheapest: &Cheapest) -> Vec<Cell> {
     let run = &shape.runs[cheapest.run as usize];
     let verdict = if cheapest.met {
         percent(cheapest.target)
     } else {
-        let own = shape.reference.lambda_error.filter(|own| *own > 0.0);
-        let own = own.map_or_else(String::new, |own| {
-            format!(" (the refined run is off by up to {})", percent(own))
-        });
+        let target = percent(cheapest.target);
         format!(
-            "\u{25b2} {} is not reached{own}; closest",
-            percent(cheapest.target)
+            "\u{25b2} {target} is not reached{}; closest",
+            refined_error(shape)
         )
     };
     vec![

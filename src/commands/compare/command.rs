@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::text::summary;
-use super::{CompareOptions, run};
+use super::{CompareOptions, cost, run};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
@@ -92,11 +92,9 @@ impl Compare {
         };
         let files = [&self.plot, &self.plot_where].map(Option::as_ref);
         let [plot, plot_where] = pictures::checked(files, self.writing.force, &document)?;
-        allow(
-            costs(&document.design, &shapes, self.tolerance.tolerance),
-            cost_origin(&shapes),
-            printer,
-        )?;
+        let mut costs = costs(&document.design, &shapes, self.tolerance.tolerance);
+        costs.push(cost(&document.design, &shapes));
+        allow(costs, cost_origin(&shapes), printer)?;
         let bar = begin(printer);
         let report = run(&document.design, &shapes, &document.input, &options, &bar)?;
         drop(bar);

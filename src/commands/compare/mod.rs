@@ -28,6 +28,7 @@ use crate::plot::slices::Slice;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::core_material::Material;
+use crate::scene::cost::{Cost, of_comparison};
 use crate::scene::passive::{self, Pull};
 use crate::scene::sources::{ShapeSource, check_names};
 use crate::scene::steel;
@@ -189,6 +190,14 @@ struct Rendered {
     /// Relative; `None` of a constant that was given.
     error: Option<f64>,
     currents_a: Vec<f64>,
+}
+
+/// The memory that the comparison of `shapes` takes.
+#[must_use]
+pub fn cost(design: &Design, shapes: &[ShapeSource]) -> Cost {
+    let documents: Vec<_> = shapes.iter().map(|shape| &shape.document).collect();
+    let coils = design.array.positions_m.len();
+    of_comparison(&documents, coils, 2 * size_of::<Felt>())
 }
 
 /// Forces of one object at the places of another.

@@ -119,7 +119,7 @@ pub fn run(
         ..
     } = OpenedSurface::new(document, inputs, progress)?;
     let failed = |source: ShapeError| shape_error(document, source);
-    let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
+    let grid = requested_grid(document, &surface).map_err(failed)?;
     let probe = Probe::new(&surface, &grid);
     let rounding_m = surface.height_rounding_m();
     let mut accuracy = BTreeMap::new();

@@ -1,5 +1,7 @@
 //! A replay over time: where the finger is, the forces with and without feedback, the currents.
 
+use std::ops::Range;
+
 use kuva::plot::annotations::ShadedRegion;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
@@ -11,7 +13,7 @@ use super::entry;
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [620.0, 330.0];
-/// Of more positions only the extremes of so many equal parts of the time are drawn.
+/// Of more than twice as many positions only the extremes of so many equal parts of the time are drawn.
 const PARTS: usize = 800;
 /// Most coils named in the legend.
 const NAMED: usize = 12;
@@ -187,24 +189,12 @@ impl ReplayPlot<'_> {
 
     /// A curve over time, broken where nothing is shown.
     fn lines(&self, values: &[f64], shown: &[bool], colour: &str, width: f64) -> Vec<Plot> {
-        let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
-        let mut joined = false;
-        for row in 0..values.len() {
-            if shown[row] {
-                if !joined {
-                    pieces.push(Vec::new());
-                }
-                if let Some(piece) = pieces.last_mut() {
-                    piece.push((self.t_s[row], values[row]));
-                }
-            }
-            joined = shown[row];
-        }
-        let line = |piece: Vec<(f64, f64)>| {
-            let line = LinePlot::new().with_data(thinned(piece));
+        let line = |piece: Vec<usize>| {
+            let points = piece.into_iter().map(|row| (self.t_s[row], values[row]));
+            let line = LinePlot::new().with_data(points.collect::<Vec<_>>());
             Plot::Line(line.with_color(colour).with_stroke_width(width))
         };
-        pieces.into_iter().map(line).collect()
+        pieces(values, shown).into_iter().map(line).collect()
     }
 
     /// Whether every finger is inside the map.
@@ -220,16 +210,15 @@ impl ReplayPlot<'_> {
             .with_title(title)
             .with_x_label("t / s")
             .with_y_label(label);
-        let (mut row, rows) = (0, self.t_s.len());
-        while row < rows {
-            let end = (row..rows).find(|k| self.inside(*k) != self.inside(row));
-            let end = end.unwrap_or(rows);
-            if !self.inside(row) {
-                let until = self.t_s.get(end).copied().unwrap_or(to);
-                let shade = ShadedRegion::vertical(self.t_s[row], until);
+        let parts: Vec<_> = parts(self.t_s.len()).collect();
+        let outside = |part: &Range<usize>| part.clone().any(|row| !self.inside(row));
+        for alike in parts.chunk_by(|a, b| outside(a) == outside(b)) {
+            let rows = alike[0].start..alike[alike.len() - 1].end;
+            if outside(&alike[0]) {
+                let until = self.t_s.get(rows.end).copied().unwrap_or(to);
+                let shade = ShadedRegion::vertical(self.t_s[rows.start], until);
                 layout = layout.with_shaded_region(shade.with_color(SURFACE));
             }
-            row = end;
         }
         layout
     }
@@ -247,30 +236,41 @@ fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (ends.0 - room, ends.1 + room)
 }
 
-/// Of many points the lowest and the highest of every part, in order.
-fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= 2 * PARTS {
-        return points;
-    }
-    let size = points.len().div_ceil(PARTS);
-    let mut kept = Vec::with_capacity(2 * PARTS);
-    for part in points.chunks(size) {
-        let at = |better: fn(f64, f64) -> bool| {
-            (1..part.len()).fold(0, |best, k| {
-                if better(part[k].1, part[best].1) {
-                    k
-                } else {
-                    best
+/// The rows that are drawn together: each alone, or of many rows those of one part of the time.
+fn parts(rows: usize) -> impl Iterator<Item = Range<usize>> {
+    let size = if rows <= 2 * PARTS {
+        1
+    } else {
+        rows.div_ceil(PARTS)
+    };
+    (0..rows)
+        .step_by(size)
+        .map(move |row| row..rows.min(row + size))
+}
+
+/// The rows of a curve's pieces, in order: of every part the lowest and the highest that are shown; a part with
+/// none ends a piece.
+fn pieces(values: &[f64], shown: &[bool]) -> Vec<Vec<usize>> {
+    let mut pieces = vec![Vec::new()];
+    for part in parts(values.len()) {
+        let rows = || part.clone().filter(|row| shown[*row]);
+        let order = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
+        match (
+            rows().min_by(order),
+            rows().max_by(order),
+            pieces.last_mut(),
+        ) {
+            (Some(low), Some(high), Some(piece)) => {
+                piece.push(low.min(high));
+                if low != high {
+                    piece.push(low.max(high));
                 }
-            })
-        };
-        let (low, high) = (at(|a, b| a < b), at(|a, b| a > b));
-        kept.push(part[low.min(high)]);
-        if low != high {
-            kept.push(part[low.max(high)]);
+            }
+            _ => pieces.push(Vec::new()),
         }
     }
-    kept
+    pieces.retain(|piece| !piece.is_empty());
+    pieces
 }
 
 #[cfg(test)]
@@ -323,16 +323,20 @@ mod tests {
         assert!(svg == drawn(300, 1), "not the same bytes twice");
         assert!(!svg.contains("second finger"));
         assert!(drawn(300, 2).contains("second finger"));
+        // Every 50th position is outside the map: pieces without end, if each were drawn.
         let many = drawn(100_000, 1).len();
-        assert!(many < 3_000_000, "{many} bytes");
+        assert!(many < 400_000, "{many} bytes");
     }
 
     #[test]
-    fn thinning_keeps_extremes_and_order() {
-        let mut points: Vec<(f64, f64)> = (0..10_000).map(|k| (f64::from(k), 0.0)).collect();
-        (points[4_321].1, points[4_322].1) = (-7.0, 13.0);
-        let kept = thinned(points);
-        assert!(kept.len() <= 2 * PARTS && kept.is_sorted_by(|a, b| a.0 < b.0));
-        assert!(kept.contains(&(4_321.0, -7.0)) && kept.contains(&(4_322.0, 13.0)));
+    fn thinning_keeps_extremes_order_and_gaps() {
+        let mut values = vec![0.0; 10_000];
+        (values[4_321], values[4_322], values[7_000]) = (-7.0, 13.0, 99.0);
+        let mut shown = vec![true; values.len()];
+        shown[6_990..7_020].fill(false);
+        let kept = pieces(&values, &shown);
+        let all = kept.concat();
+        assert!(kept.len() == 2 && all.len() <= 2 * PARTS && all.is_sorted_by(|a, b| a < b));
+        assert!(all.contains(&4_321) && all.contains(&4_322) && !all.contains(&7_000));
     }
 }

@@ -9,7 +9,7 @@ use kuva::render::plots::Plot;
 
 use super::drawing::Drawing;
 use super::pareto::{extent, readable};
-use super::plane::{Cells, NOTHING, Together, colours, rows, wide};
+use super::plane::{Cells, Together, colours, rows, wide};
 use super::replay::COILS;
 
 /// A panel's size, px.
@@ -18,8 +18,8 @@ const PANEL_PX: [f64; 2] = [460.0, 400.0];
 const TITLE_PX: u32 = 14;
 /// Width of a line over the colours, px.
 const LINE_PX: f64 = 1.0;
-/// Where there is no field: in steel or hardly off it.
-const STEEL: &str = "#c3c9cf";
+/// Where there is no value: in steel or hardly off it, beside a surface.
+pub(super) const NO_VALUE: &str = "#c3c9cf";
 /// Colours of the largest negative value and of the largest positive one, which stay apart for the
 /// colour-blind; between them white, which is zero.
 const ENDS: [[f64; 3]; 2] = [[5.0, 48.0, 97.0], [178.0, 24.0, 43.0]];
@@ -163,7 +163,7 @@ fn slice(slice: &Slice) -> (Vec<Plot>, Layout) {
     let [x, y] = slice.ends_m.map(|ends| wide(ends.map(|m| 1e3 * m)));
     let colours = match slice.shades {
         Shades::Signed => diverging(cells.iter().flatten().copied()),
-        Shades::Decades => steel_or(colours()),
+        Shades::Decades => with_gaps(colours()),
     };
     let heatmap = Heatmap::new()
         .with_data(cells)
@@ -193,10 +193,10 @@ fn slice(slice: &Slice) -> (Vec<Plot>, Layout) {
     (plots.collect(), layout)
 }
 
-/// `map`, and the colour of steel where there is nothing.
-fn steel_or(map: ColorMap) -> ColorMap {
+/// `map`, and [`NO_VALUE`] where there is none.
+fn with_gaps(map: ColorMap) -> ColorMap {
     ColorMap::Custom(Arc::new(move |share: f64| match share.is_nan() {
-        true => STEEL.to_owned(),
+        true => NO_VALUE.to_owned(),
         false => map.map(share),
     }))
 }
@@ -221,7 +221,7 @@ fn diverging(values: impl Iterator<Item = f64>) -> ColorMap {
 
 fn colour(value: f64, most: f64) -> String {
     if value.is_nan() {
-        return NOTHING.to_owned();
+        return NO_VALUE.to_owned();
     }
     let strength = if most > 0.0 {
         (value / most).clamp(-1.0, 1.0)
@@ -272,6 +272,7 @@ mod tests {
             ["#b2182b", "#053061"]
         );
         assert_eq!(colour(0.0, 0.0), "#ffffff");
+        assert_eq!(colour(f64::NAN, 1.3), NO_VALUE, "nothing is not zero");
         // A range that is not symmetric keeps its zero.
         let ColorMap::Custom(map) = diverging([-0.3, 0.9].into_iter()) else {
             panic!("a map of our own");

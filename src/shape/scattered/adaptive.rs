@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Probe, Scattered, check_count};
+use super::{Probe, Scattered};
 use crate::deviation::{Patch, Rect};
 use crate::error::ShapeError;
 use crate::height::Sample;
@@ -178,7 +178,8 @@ impl Work<'_> {
 
     fn refine(&mut self, low: Node, level: u32, members: &[u32]) -> Result<(), ShapeError> {
         self.progress.check()?;
-        check_count(self.found, "allow a larger deviation")?;
+        self.probe
+            .check_count(self.found, "allow a larger deviation")?;
         let size = 1 << level;
         let rect = self.rect(low, size);
         let corners =

@@ -5,7 +5,7 @@
 //! the area nearer to it than to any other: that over the cells of a finer grid, in parts of them, a cell that
 //! the surface leaves whole for one of its places; such a place that is a spacing or more from all points becomes one.
 
-use super::{Probe, Scattered, check_count};
+use super::{Probe, Scattered};
 use crate::deviation::{Rect, Standing};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample};
@@ -62,7 +62,7 @@ pub fn poisson(
     let sides = probe.plan_m.sides();
     let count = sides.map(|side| (side / cell_m).ceil().max(1.0) as usize);
     // About every second one holds a point.
-    check_count(
+    probe.check_count(
         count[0].saturating_mul(count[1]) / 2,
         "take a larger spacing",
     )?;
