@@ -26,6 +26,7 @@
 //! The bound is met within a factor of two by a point charge at the nearest place.
 
 mod axial;
+mod ends;
 mod solid;
 
 use thiserror::Error;
@@ -157,6 +158,32 @@ pub struct Node {
     pub offset_m: [f64; 3],
     /// The node's share of the moment, A m^2; shares may be negative.
     pub moment_a_m2: [f64; 3],
+}
+
+/// A point of a magnet's ends, and the charge that stands for the magnetisation there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Charge {
+    /// Offset from the magnet's centre, m.
+    pub offset_m: [f64; 3],
+    /// Charge: its potential at distance d is charge / (4 pi d), the force on it charge B, A m.
+    pub charge_a_m: f64,
+}
+
+impl Cylinder {
+    /// Charges that act as the cylinder does, and feel its force, with the bound of [`MagnetRule::cylinder`]. Close by they
+    /// are far fewer than its nodes.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn charges(
+        self,
+        moment_a_m2: [f64; 3],
+        sources: Sources,
+        tolerance: f64,
+    ) -> Result<Vec<Charge>, NoRule> {
+        let (cylinder, gap_m) = Placed::new(self, moment_a_m2, sources, tolerance)?;
+        ends::charges(&cylinder, sources, tolerance).ok_or(NoRule::TooClose { gap_m, tolerance })
+    }
 }
 
 /// Where a magnet needs the field, and what to do with it there.

@@ -65,7 +65,7 @@ pub fn mul_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
 pub const LANES: usize = 8;
 
 /// A few numbers treated alike; the compiler turns the lane loops into vector instructions.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Lanes(pub [f64; LANES]);
 
 macro_rules! lane_operator {

@@ -253,7 +253,7 @@ pub fn direct_z_n(
         .fold(f64::INFINITY, f64::min);
     let neighbours = (pulled.coupled && axes.len() > 1).then(|| {
         let few = magnet.few_dipoles(tolerance);
-        let gap_m = magnet.gap_of_m(&few);
+        let gap_m = magnet.gap_of_m(few.iter().map(|dipole| dipole.at_m));
         Neighbours::new(shape, mu_r, axes, closest_m, gap_m, tolerance, few)
     });
     Ok(Some(

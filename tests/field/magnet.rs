@@ -167,7 +167,9 @@ fn charge(p: Vector) -> CartesianField {
 #[test]
 fn the_bound_holds_for_a_charge_at_the_nearest_place() {
     // The worst that the rule promises to stand; relative to the charge's gradient 2 / distance^3.
-    println!("height (tolerance): nodes, factor, errors with the charge under axis, rim and aside");
+    println!(
+        "height (tolerance): nodes, factor, charges, errors of both with a charge under axis, rim and aside"
+    );
     for height in [0.006, 0.007, 0.0085, 0.01, 0.013, 0.02, 0.03] {
         for tolerance in [1e-3, 1e-6, 1e-9] {
             for tilt in [[0.0; 2], TILT_DEG] {
@@ -181,6 +183,7 @@ fn the_bound_holds_for_a_charge_at_the_nearest_place() {
                     Err(NoRule::TooClose { .. }) if height < 0.0065 && tolerance < 1e-5 => continue,
                     Err(error) => panic!("{height} {tolerance:e} {tilt:?}: {error}"),
                 };
+                let charges = SEED_MAGNET.charges(m, sources, tolerance).unwrap();
                 let size = norm(m) * 2.0 / height.powi(3);
                 let mut line = String::new();
                 for aside in [0.0, 0.2, 0.4, 0.5, -0.5, 0.6, 0.9] {
@@ -188,12 +191,18 @@ fn the_bound_holds_for_a_charge_at_the_nearest_place() {
                     let (force, torque) = by_rule_in(&rule, centre, &charge);
                     let (exact_force, exact_torque) =
                         by_current_sheet_in(SEED_MAGNET, tilt, centre, &charge);
-                    let error = distance(force, exact_force) / size;
-                    line += &format!(" {error:.0e}");
-                    assert!(
-                        error < tolerance,
-                        "{height} {tolerance:e} {tilt:?}: {error:e}"
-                    );
+                    let of_charges = charges.iter().fold([0.0; 3], |sum, end| {
+                        let field = charge(plus(centre, end.offset_m)).field_t_per_a;
+                        plus(sum, field.map(|b| end.charge_a_m * b))
+                    });
+                    for (force, from) in [(force, "dipoles"), (of_charges, "charges")] {
+                        let error = distance(force, exact_force) / size;
+                        line += &format!(" {error:.0e}");
+                        assert!(
+                            error < tolerance,
+                            "{height} {tolerance:e} {tilt:?}, {from}: {error:e}"
+                        );
+                    }
                     // The field of the charge is height / 2 times its gradient.
                     let turn = distance(torque, exact_torque) / (0.5 * size * height);
                     assert!(
@@ -202,7 +211,8 @@ fn the_bound_holds_for_a_charge_at_the_nearest_place() {
                     );
                 }
                 let (nodes, factor) = (rule.nodes().len(), rule.amplification());
-                println!("{height} ({tolerance:e}): {nodes:>4} {factor:.0}{line}");
+                let ends = charges.len();
+                println!("{height} ({tolerance:e}): {nodes:>4} {factor:.0} {ends:>4}{line}");
             }
         }
     }

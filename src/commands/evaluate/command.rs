@@ -305,8 +305,11 @@ fn at_target(target: &TargetSummary) -> String {
             let rounded = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
             values.map(|v| si(rounded(v), unit)).join(", ")
         };
+        let of = target
+            .passive_force_n
+            .map_or("", |_| ", of the current alone");
         text.push_str(&format!(
-            "\nforce along x, y, z {}\ntorque about x, y, z {}",
+            "\nforce along x, y, z {}\ntorque about x, y, z {}{of}",
             vector(target.force_vector_n, "N"),
             vector(target.torque_n_m, "N m")
         ));

@@ -1,8 +1,8 @@
 //! The pull of unpowered steel of any shape on the magnet.
 //!
 //! The equations are factorised once; then every place of the magnet is one more right-hand side, the
-//! potential of its dipoles. The layer that they induce acts back on them: F = sum_k (m_k . grad) B and the energy
-//! W = -(1/2) sum_k m_k . B, whose slope F is too.
+//! potential of its dipoles or charges. The layer that they induce acts back on them: F = sum_k (m_k . grad) B + q_k B,
+//! and of dipoles the energy W = -(1/2) sum_k m_k . B, whose slope F is too.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ use super::surface::{Surface, mirrored};
 use super::system::{FactoredSystem, System};
 use crate::steel::passive::isolated::placed;
 use crate::steel::passive::magnet::{PassiveMagnet, dipoles};
-use crate::steel::passive::reaction::{Dipole, Induced};
-use fluxform_numerics::vec3::{dot, minus, norm};
+use crate::steel::passive::reaction::{Induced, PointSource};
+use fluxform_numerics::vec3::{dot, minus, norm, plus};
 
 /// Least part of the difference from the coarsest solution that counts as error: neighbours among the
 /// [`RESOLUTIONS`] cut the faces alike away from edges, and may agree better than they are.
@@ -56,8 +56,8 @@ impl Answer {
         })
     }
 
-    /// The field that the steel sends back to every dipole of `magnets`, each set acting alone.
-    fn induced(&self, magnets: &[Vec<Dipole>]) -> Vec<Vec<Induced>> {
+    /// The field that the steel sends back to every source of `magnets`, each set acting alone.
+    fn induced(&self, magnets: &[Vec<PointSource>]) -> Vec<Vec<Induced>> {
         let size = self.surface.size();
         let potentials: Vec<DMatrix<f64>> = (self.images.iter())
             .map(|signs| {
@@ -67,20 +67,17 @@ impl Answer {
                     for (value, node) in column.iter_mut().zip(&self.surface.nodes) {
                         fluxform_base::progress::poll();
                         let place_m = mirrored(node, *signs, self.planes_m).place_m;
-                        let of_dipole = |dipole: &Dipole| {
-                            let d = minus(place_m, dipole.at_m);
-                            dot(dipole.moment_a_m2, d) / (4.0 * PI * norm(d).powi(3))
-                        };
-                        *value = magnet.iter().map(of_dipole).sum();
+                        let sum: f64 = magnet.iter().map(|source| source.potential(place_m)).sum();
+                        *value = sum / (4.0 * PI);
                     }
                 });
                 potentials
             })
             .collect();
         let layers = self.system.solve(&potentials);
-        let of_magnet = |(number, magnet): (usize, &Vec<Dipole>)| {
-            let of_dipole = |dipole: &Dipole| self.field(dipole.at_m, &layers, number);
-            magnet.iter().map(of_dipole).collect()
+        let of_magnet = |(number, magnet): (usize, &Vec<PointSource>)| {
+            let of_source = |source: &PointSource| self.field(source.at_m, &layers, number);
+            magnet.iter().map(of_source).collect()
         };
         magnets.par_iter().enumerate().map(of_magnet).collect()
     }
@@ -122,16 +119,16 @@ fn tiers(tolerance: f64, last: Option<usize>) -> [usize; 2] {
     [coarsest(tolerance).min(last - 1), last]
 }
 
-/// Where the dipoles of `magnet` may be with its centre among `places_m`, and their images; `None` where they are
+/// Where the sources of `magnet` may be with its centre among `places_m`, and their images; `None` where they are
 /// not above the steel.
 fn room(iron: &Iron, magnet: &PassiveMagnet, places_m: &[Point]) -> Option<MagnetRoom> {
     let lowest_m = places_m.iter().fold(f64::INFINITY, |z, at| z.min(at[2]));
-    let rule = magnet.rule(lowest_m);
+    let sources = magnet.sources(lowest_m);
     let ends = |i: usize| {
         let of = |ends: [f64; 2], at: f64| [ends[0].min(at), ends[1].max(at)];
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let centres = places_m.iter().map(|place| place[i]).fold(none, of);
-        let about = rule.iter().map(|dipole| dipole.at_m[i]).fold(none, of);
+        let about = sources.iter().map(|source| source.at_m[i]).fold(none, of);
         [centres[0] + about[0], centres[1] + about[1]]
     };
     let [x_m, y_m, z_m] = [0, 1, 2].map(ends);
@@ -264,39 +261,42 @@ impl IronPull {
     /// The force on the magnet with its centre at each of `places_m`, N.
     #[must_use]
     pub fn forces_n(&self, places_m: &[Point]) -> Vec<Point> {
-        let of = |at_m: Point, back: &[Induced]| {
-            let gradients: Vec<_> = back.iter().map(|field| field.gradient_t_per_m).collect();
-            self.magnet.magnet_rule(at_m[2]).force_n(&gradients)
-        };
-        self.at_places(places_m, of)
+        let sources = |at: &Point| self.magnet.sources(at[2]);
+        self.at_places(places_m, sources, |sources, back| {
+            let forces = sources
+                .iter()
+                .zip(back)
+                .map(|(source, field)| source.force_n(field));
+            forces.fold([0.0; 3], plus)
+        })
     }
 
-    /// The energy of the magnet with its centre at each of `places_m`, J.
+    /// The energy of the magnet, by dipoles throughout it, with its centre at each of `places_m`, J.
     #[must_use]
     pub fn energies_j(&self, places_m: &[Point]) -> Vec<f64> {
-        let of = |at_m: Point, back: &[Induced]| {
-            let rule = self.magnet.rule(at_m[2]);
-            let fields = rule.iter().zip(back);
+        let throughout = |at: &Point| dipoles(&self.magnet.magnet_rule(at[2]));
+        self.at_places(places_m, throughout, |dipoles, back| {
+            let fields = dipoles.iter().zip(back);
             let along = fields.map(|(dipole, field)| dot(dipole.moment_a_m2, field.field_t));
             -0.5 * along.sum::<f64>()
-        };
-        self.at_places(places_m, of)
+        })
     }
 
-    /// `of` every place what the steel sends back to the magnet there.
+    /// `of` every place the sources that stand for the magnet there and what the steel sends back to them.
     fn at_places<T: Send>(
         &self,
         places_m: &[Point],
-        of: impl Fn(Point, &[Induced]) -> T + Sync,
+        sources: impl Fn(&Point) -> Vec<PointSource> + Sync,
+        of: impl Fn(&[PointSource], &[Induced]) -> T + Sync,
     ) -> Vec<T> {
         let portions: Vec<Vec<T>> = places_m
             .par_chunks(TOGETHER)
             .map(|places_m| {
-                let magnet = |at: &Point| placed(&dipoles(&self.magnet.magnet_rule(at[2])), *at);
-                let magnets: Vec<Vec<Dipole>> = places_m.iter().map(magnet).collect();
+                let magnet = |at: &Point| placed(&sources(at), *at);
+                let magnets: Vec<Vec<PointSource>> = places_m.iter().map(magnet).collect();
                 let back = self.answer.induced(&magnets);
-                let places = places_m.iter().zip(&back);
-                places.map(|(at_m, back)| of(*at_m, back)).collect()
+                let pairs = magnets.iter().zip(&back);
+                pairs.map(|(sources, back)| of(sources, back)).collect()
             })
             .collect();
         portions.into_iter().flatten().collect()

@@ -27,7 +27,7 @@ use neighbours::Neighbours;
 use reaction::{Reaction, ReactionResolution};
 use table::Grid;
 
-use fluxform_numerics::vec3::{minus, norm};
+use fluxform_numerics::vec3::{minus, norm, plus};
 
 /// Where the magnet's centre may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -372,7 +372,7 @@ fn couple(pulled: &Pulled, magnet: &PassiveMagnet, closest_m: f64, tolerance: f6
         pulled.relative_permeability,
         pulled.positions_m,
         closest_m,
-        magnet.gap_of_m(&dipoles),
+        magnet.gap_of_m(dipoles.iter().map(|dipole| dipole.at_m)),
         tolerance,
         dipoles,
     )
@@ -449,10 +449,13 @@ impl Checks {
         let forces_n = places_m
             .par_iter()
             .map(|at| {
-                let rule = magnet.magnet_rule(at[2]);
-                let fields = finer.induced(&placed(&magnet::dipoles(&rule), *at));
-                let gradients: Vec<_> = fields.iter().map(|f| f.gradient_t_per_m).collect();
-                rule.force_n(&gradients)
+                let sources = placed(&magnet.sources(at[2]), *at);
+                let fields = finer.induced(&sources);
+                let forces = sources
+                    .iter()
+                    .zip(&fields)
+                    .map(|(source, field)| source.force_n(field));
+                forces.fold([0.0; 3], plus)
             })
             .collect();
         Self { places_m, forces_n }

@@ -15,8 +15,9 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 use super::magnet::PassiveMagnet;
-use super::reaction::{Dipole, Reaction};
+use super::reaction::{PointSource, Reaction};
 use super::table::{Grid, Tables};
+use fluxform_numerics::vec3::plus;
 
 /// Harmonics of a tilted cylinder beyond a dipole's two.
 const CYLINDER_HARMONICS: usize = 3;
@@ -45,7 +46,7 @@ impl Isolated {
         let azimuth = moment[1].atan2(moment[0]);
         let samples = if harmonics == 0 { 1 } else { harmonics + 2 };
         let [across, up] = grid.nodes;
-        let rules: Vec<_> = (0..up).map(|j| magnet.rule(grid.height_m(j))).collect();
+        let sources: Vec<_> = (0..up).map(|j| magnet.sources(grid.height_m(j))).collect();
         let energies: Vec<f64> = (0..up * across * samples)
             .into_par_iter()
             .map(|index| {
@@ -56,7 +57,7 @@ impl Isolated {
                 let (s, c) = theta.sin_cos();
                 let r_m = grid.distance_m(k);
                 let centre = [r_m * c, r_m * s, grid.height_m(j)];
-                reaction.energy_j(&placed(&rules[j], centre))
+                reaction.energy_j(&placed(&sources[j], centre))
             })
             .collect();
         let largest = energies.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
@@ -127,15 +128,14 @@ impl Isolated {
     }
 }
 
-/// The dipoles of a rule about a centre.
+/// The sources that stand for a magnet, about a centre.
 #[must_use]
-pub fn placed(rule: &[Dipole], centre_m: [f64; 3]) -> Vec<Dipole> {
-    rule.iter()
-        .map(|d| Dipole {
-            at_m: std::array::from_fn(|i| d.at_m[i] + centre_m[i]),
-            ..*d
-        })
-        .collect()
+pub fn placed(sources: &[PointSource], centre_m: [f64; 3]) -> Vec<PointSource> {
+    let about = |source: &PointSource| PointSource {
+        at_m: plus(source.at_m, centre_m),
+        ..*source
+    };
+    sources.iter().map(about).collect()
 }
 
 fn power(harmonic: usize) -> i32 {

@@ -1,8 +1,8 @@
-//! The magnet that the steel pulls: a dipole or a cylinder, as point dipoles at a given height.
+//! The magnet that the steel pulls: a dipole or a cylinder, as point sources at a given height.
 
 use super::NoPull;
-use super::reaction::Dipole;
-use crate::magnet::{Cylinder, MagnetRule, Sources};
+use super::reaction::{Dipole, PointSource};
+use crate::magnet::{Charge, Cylinder, MagnetRule, Node, Sources};
 
 /// Height, in radii of the ball around the magnet, from which dipoles on its axis do.
 const FAR_REACHES: f64 = 2.0;
@@ -95,37 +95,56 @@ impl PassiveMagnet {
         BOTH * self.magnet_rule(z_m).bound()
     }
 
-    /// The dipoles of [`PassiveMagnet::magnet_rule`] about the centre.
+    /// The sources that stand for it with its centre at height `z_m`, about the centre: dipoles, or charges on its ends
+    /// where those are fewer.
     #[must_use]
-    pub fn rule(&self, z_m: f64) -> Vec<Dipole> {
-        dipoles(&self.magnet_rule(z_m))
+    pub fn sources(&self, z_m: f64) -> Vec<PointSource> {
+        let rule = self.magnet_rule(z_m);
+        let charges = self.size.and_then(|size| {
+            let sources = self.steel_below(z_m.clamp(self.lowest_m, self.fixed_m));
+            let charges = size.charges(self.moment_a_m2, sources, self.tolerance);
+            charges
+                .ok()
+                .filter(|charges| charges.len() < rule.nodes().len())
+        });
+        let Some(charges) = charges else {
+            return dipoles(&rule);
+        };
+        let of_charge = |charge: &Charge| PointSource {
+            at_m: charge.offset_m,
+            charge_a_m: charge.charge_a_m,
+            ..PointSource::default()
+        };
+        charges.iter().map(of_charge).collect()
     }
 
     /// Few dipoles on the magnet's axis that stand for it to `tolerance` from a height that
     /// allows them; closer they are a guess for what matters little there.
     #[must_use]
     pub fn few_dipoles(&self, tolerance: f64) -> Vec<Dipole> {
-        let Some(size) = self.size else {
-            return self.rule(self.lowest_m);
+        let few = self.size.and_then(|size| {
+            let height_m = (self.lowest_m - self.top_m).max(FAR_REACHES * size.reach_m());
+            let sources = Sources::Below { height_m };
+            MagnetRule::cylinder(size, self.moment_a_m2, sources, tolerance).ok()
+        });
+        let rule = few.unwrap_or_else(|| self.magnet_rule(self.lowest_m));
+        let of_node = |node: &Node| Dipole {
+            at_m: node.offset_m,
+            moment_a_m2: node.moment_a_m2,
         };
-        let height_m = (self.lowest_m - self.top_m).max(FAR_REACHES * size.reach_m());
-        let sources = Sources::Below { height_m };
-        MagnetRule::cylinder(size, self.moment_a_m2, sources, tolerance)
-            .map_or_else(|_| self.rule(self.lowest_m), |rule| dipoles(&rule))
+        rule.nodes().iter().map(of_node).collect()
     }
 
-    /// How far the lowest dipole of a rule is above the steel.
+    /// How far the lowest of its sources is above the steel.
     #[must_use]
     pub fn gap_m(&self) -> f64 {
-        self.gap_of_m(&self.rule(self.lowest_m))
+        self.gap_of_m(self.sources(self.lowest_m).iter().map(|source| source.at_m))
     }
 
-    /// The same of given dipoles about the centre.
+    /// The same of given places about the centre.
     #[must_use]
-    pub fn gap_of_m(&self, dipoles: &[Dipole]) -> f64 {
-        let lowest = dipoles
-            .iter()
-            .fold(0.0_f64, |lowest, d| lowest.min(d.at_m[2]));
+    pub fn gap_of_m(&self, places_m: impl Iterator<Item = [f64; 3]>) -> f64 {
+        let lowest = places_m.fold(0.0_f64, |lowest, at| lowest.min(at[2]));
         self.lowest_m + lowest - self.top_m
     }
 
@@ -133,9 +152,7 @@ impl PassiveMagnet {
         let Some(size) = self.size else {
             return Ok(MagnetRule::dipole(self.moment_a_m2));
         };
-        let sources = Sources::Below {
-            height_m: z_m - self.top_m,
-        };
+        let sources = self.steel_below(z_m);
         Ok(MagnetRule::cylinder(
             size,
             self.moment_a_m2,
@@ -143,16 +160,23 @@ impl PassiveMagnet {
             self.tolerance,
         )?)
     }
+
+    fn steel_below(&self, z_m: f64) -> Sources {
+        Sources::Below {
+            height_m: z_m - self.top_m,
+        }
+    }
 }
 
 /// A rule's nodes as dipoles about the centre.
 #[must_use]
-pub fn dipoles(rule: &MagnetRule) -> Vec<Dipole> {
+pub fn dipoles(rule: &MagnetRule) -> Vec<PointSource> {
     rule.nodes()
         .iter()
-        .map(|node| Dipole {
+        .map(|node| PointSource {
             at_m: node.offset_m,
             moment_a_m2: node.moment_a_m2,
+            charge_a_m: 0.0,
         })
         .collect()
 }

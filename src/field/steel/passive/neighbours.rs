@@ -27,7 +27,8 @@ use crate::steel::response::{Response, Rings};
 use crate::steel::symmetry::Motion;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::bounded_eigen::symmetric_eigen;
-use fluxform_numerics::vec3::{dot, minus};
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
+use fluxform_numerics::vec3::{dot, minus, plus};
 
 /// Longest panel of the exchange grid, in distances from the magnet.
 const PANEL: f64 = 1.5;
@@ -44,8 +45,8 @@ type Points = Vec<GridPoint>;
 #[derive(Debug, Clone)]
 pub struct Neighbours {
     positions_m: Vec<[f64; 2]>,
-    /// Exchange grid of a core, index = angle * rings + ring.
-    points: Points,
+    /// Exchange grid of a core, index = angle * rings + ring, side by side.
+    points: Vec<[Lanes; 6]>,
     /// Normal derivatives on the grid to components of b, [kept, grid].
     reduce: DMatrix<f64>,
     /// W_added = -(mu_0/2) b' form b, index = core * kept + place.
@@ -121,7 +122,7 @@ impl Neighbours {
         let form = system.lu().solve(&links).unwrap_or(links) * turn;
         Self {
             positions_m: positions_m.to_vec(),
-            points,
+            points: points.chunks(LANES).map(abreast).collect(),
             reduce: basis.moments.transpose(),
             form: 0.5 * (&form + form.transpose()),
             magnet,
@@ -159,17 +160,26 @@ impl Neighbours {
         // and so on.
         let cores = self.positions_m.len();
         let columns = cores * (1 + N);
-        let mut grid = DMatrix::zeros(self.points.len(), P * columns);
+        let mut grid = DMatrix::zeros(self.reduce.ncols(), P * columns);
+        let mut out = vec![(Lanes::splat(0.0), [Lanes::splat(0.0); N]); self.points.len()];
         for (place, at_m) in places_m.iter().enumerate() {
             fluxform_base::progress::poll();
             let mut grid = grid.columns_mut(place * columns, columns);
             for (core, [x, y]) in self.positions_m.iter().enumerate() {
-                let centre = [at_m[0] - x, at_m[1] - y, at_m[2]];
-                for (row, point) in self.points.iter().enumerate() {
-                    let (normal, slope) = self.field_of_magnet(*point, centre, axes);
-                    grid[(row, core)] = normal;
-                    for (place, s) in slope.iter().enumerate() {
-                        grid[(row, core + cores * (1 + place))] = *s;
+                dispatch::run(MagnetField {
+                    points: &self.points,
+                    magnet: &self.magnet,
+                    centre: [at_m[0] - x, at_m[1] - y, at_m[2]],
+                    axes,
+                    out: &mut out,
+                });
+                for part in 0..=N {
+                    let mut column = grid.column_mut(core + cores * part);
+                    let rows = column.as_mut_slice().chunks_mut(LANES);
+                    for (rows, (normal, slopes)) in rows.zip(&out) {
+                        part.checked_sub(1)
+                            .map_or(normal, |axis| &slopes[axis])
+                            .store(rows);
                     }
                 }
             }
@@ -186,33 +196,62 @@ impl Neighbours {
             std::array::from_fn(|axis| scale * answer.dot(&seen.column(first + 1 + axis)))
         })
     }
+}
 
-    /// Normal derivative of the potential of the magnet at `centre`, and its slopes by the magnet's place.
-    #[inline]
-    fn field_of_magnet<const N: usize>(
-        &self,
-        (point, n): GridPoint,
-        centre: [f64; 3],
-        axes: [usize; N],
-    ) -> (f64, [f64; N]) {
-        let from = minus(point, centre);
-        let (mut normal, mut slope) = (0.0, [0.0; N]);
-        for dipole in &self.magnet {
-            let m = dipole.moment_a_m2;
-            let d = minus(from, dipole.at_m);
-            let inverse_square = 1.0 / dot(d, d);
-            let inverse_cube = inverse_square * inverse_square.sqrt();
-            let (along, out, both) = (dot(m, d), dot(n, d), dot(n, m));
-            normal += inverse_cube * (both - 3.0 * along * out * inverse_square);
-            // By the magnet's place: minus the derivative by the point's.
-            let scale = 3.0 * inverse_cube * inverse_square;
-            let radial = both - 5.0 * along * out * inverse_square;
-            for (slope, axis) in slope.iter_mut().zip(axes) {
-                *slope += scale * (radial * d[axis] + m[axis] * out + n[axis] * along);
+/// Normal derivatives of the potential of a magnet at points, times 4 pi, and their slopes by the magnet's place.
+struct MagnetField<'a, const N: usize> {
+    /// Places and normals, side by side.
+    points: &'a [[Lanes; 6]],
+    magnet: &'a [Dipole],
+    centre: [f64; 3],
+    axes: [usize; N],
+    out: &'a mut [(Lanes, [Lanes; N])],
+}
+
+impl<const N: usize> Kernel for MagnetField<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let scalar = |a: &[Lanes; 3], b: &[Lanes; 3]| {
+            a[0].mul_add::<FMA>(b[0], a[1].mul_add::<FMA>(b[1], a[2] * b[2]))
+        };
+        for ([x, y, z, nx, ny, nz], out) in self.points.iter().zip(self.out) {
+            let n = [*nx, *ny, *nz];
+            let (mut normal, mut slopes) = (Lanes::splat(0.0), [Lanes::splat(0.0); N]);
+            for dipole in self.magnet {
+                let m = dipole.moment_a_m2.map(Lanes::splat);
+                let at_m = plus(self.centre, dipole.at_m);
+                let d = [(x, 0), (y, 1), (z, 2)].map(|(x, axis)| *x - at_m[axis]);
+                let inverse_square = Lanes::splat(1.0) / scalar(&d, &d);
+                let inverse_cube = inverse_square * inverse_square.sqrt();
+                let (along, across, both) = (scalar(&m, &d), scalar(&n, &d), scalar(&n, &m));
+                let product = along * across * inverse_square;
+                normal = (both - product * 3.0).mul_add::<FMA>(inverse_cube, normal);
+                // By the magnet's place: minus the derivative by the point's.
+                let scale = inverse_cube * inverse_square * 3.0;
+                let radial = both - product * 5.0;
+                for (slope, axis) in slopes.iter_mut().zip(self.axes) {
+                    let sideways = m[axis].mul_add::<FMA>(across, n[axis] * along);
+                    *slope = radial
+                        .mul_add::<FMA>(d[axis], sideways)
+                        .mul_add::<FMA>(scale, *slope);
+                }
             }
+            *out = (normal, slopes);
         }
-        (normal, slope)
     }
+}
+
+/// Places and normals side by side.
+fn abreast(points: &[GridPoint]) -> [Lanes; 6] {
+    let part = |k: usize| {
+        Lanes(std::array::from_fn(|lane| {
+            let (at_m, normal) = points[lane.min(points.len() - 1)];
+            [at_m, normal].as_flattened()[k]
+        }))
+    };
+    std::array::from_fn(part)
 }
 
 /// The system 1 - L R of all cores and its links L, of blocks that `exchanged` gives for an offset and
@@ -551,7 +590,7 @@ mod tests {
                 magnet,
             )
         };
-        let counts = [0.3, 3.0, 30.0].map(|length_m| of(length_m, 0.1).points.len());
+        let counts = [0.3, 3.0, 30.0].map(|length_m| of(length_m, 0.1).reduce.ncols());
         assert!(counts[2] < 3 * counts[0], "{counts:?}");
         // The layer far down is smooth: a finer solution agrees as it does for a short core.
         let at = [0.011, 0.007, 0.021];

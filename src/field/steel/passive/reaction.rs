@@ -1,11 +1,11 @@
-//! One core's answer to point dipoles close by: its layer, its field back at them, their energy.
+//! One core's answer to point sources close by: its layer, its field back at them, their energy.
 //!
-//! The dipoles' potential and its normal derivative are sampled on the outline's nodes at regular
-//! angles; mode by mode the layer follows. With the dipoles' potential phi and the layer v it
+//! The sources' potential and its normal derivative are sampled on the outline's nodes at regular
+//! angles; mode by mode the layer follows. With the sources' potential phi and the layer v it
 //! causes, the energy of the pair is
 //!
 //! ```text
-//! W = -(1/2) sum m_k . B_induced(p_k) = -(mu_0/2) int v d(phi)/dn dS.
+//! W = -(mu_0/2) int v d(phi)/dn dS,   of dipoles  -(1/2) sum m_k . B_induced(p_k).
 //! ```
 
 use nalgebra::{DMatrix, DVector};
@@ -16,6 +16,7 @@ use crate::steel::double_layer::{MAX_MODES, operators};
 use crate::steel::generatrix::{Generatrix, Resolution};
 use crate::steel::response::{mean, system};
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::vec3::{dot, minus};
 
 /// A point dipole in the frame of a core, whose axis is z.
@@ -25,6 +26,36 @@ pub struct Dipole {
     pub at_m: [f64; 3],
     /// Moment, A m^2.
     pub moment_a_m2: [f64; 3],
+}
+
+/// A dipole and a charge at one place in the frame of a core, whose axis is z.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PointSource {
+    /// Position, m.
+    pub at_m: [f64; 3],
+    /// Moment, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// Charge, A m.
+    pub charge_a_m: f64,
+}
+
+impl PointSource {
+    /// The potential at `place_m`, times 4 pi, A.
+    #[must_use]
+    pub fn potential(&self, place_m: [f64; 3]) -> f64 {
+        let d = minus(place_m, self.at_m);
+        let square = dot(d, d);
+        (self.charge_a_m + dot(self.moment_a_m2, d) / square) / square.sqrt()
+    }
+
+    /// The force of a field on it, N: (m . grad) B + q B.
+    #[must_use]
+    pub fn force_n(&self, field: &Induced) -> [f64; 3] {
+        std::array::from_fn(|i| {
+            // The gradient is symmetric.
+            dot(field.gradient_t_per_m[i], self.moment_a_m2) + self.charge_a_m * field.field_t[i]
+        })
+    }
 }
 
 /// The steel's reaction at a point.
@@ -204,27 +235,17 @@ impl Reaction {
         self.areas_m2.len()
     }
 
-    /// The energy of `dipoles` and the layer they cause, J.
+    /// The energy of `sources` and the layer they cause, J.
     #[must_use]
-    pub(crate) fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
+    pub(crate) fn energy_j(&self, sources: &[PointSource]) -> f64 {
         fluxform_base::progress::poll();
         let (mut potential, mut normal) = (self.zeros(), self.zeros());
-        for (((x, n), phi), slope) in self
-            .points
-            .iter()
-            .zip(potential.as_mut_slice())
-            .zip(normal.as_mut_slice())
-        {
-            for dipole in dipoles {
-                let m = dipole.moment_a_m2;
-                let d = minus(*x, dipole.at_m);
-                let inverse_square = 1.0 / dot(d, d);
-                let inverse_cube = inverse_square * inverse_square.sqrt();
-                let along = dot(m, d);
-                *phi += along * inverse_cube;
-                *slope += inverse_cube * (dot(*n, m) - 3.0 * along * dot(*n, d) * inverse_square);
-            }
-        }
+        dispatch::run(Potentials {
+            points: &self.points,
+            sources: &sources.chunks(LANES).map(abreast).collect::<Vec<_>>(),
+            potential: potential.as_mut_slice(),
+            normal: normal.as_mut_slice(),
+        });
         let layer = self.layer_of(&potential);
         let sum: f64 = layer
             .column_iter()
@@ -240,27 +261,23 @@ impl Reaction {
         -0.5 * MU_0_T_M_PER_A * sum / (16.0 * PI * PI)
     }
 
-    /// The field that the steel sends back to each of `dipoles`, all of them acting together.
+    /// The field that the steel sends back to each of `sources`, all of them acting together.
     #[must_use]
-    pub fn induced(&self, dipoles: &[Dipole]) -> Vec<Induced> {
+    pub fn induced(&self, sources: &[PointSource]) -> Vec<Induced> {
         fluxform_base::progress::poll();
         let mut potential = self.zeros();
         for ((x, _), phi) in self.points.iter().zip(potential.as_mut_slice()) {
-            for dipole in dipoles {
-                let d = minus(*x, dipole.at_m);
-                let square = dot(d, d);
-                *phi += dot(dipole.moment_a_m2, d) / (square * square.sqrt());
-            }
+            *phi = sources.iter().map(|source| source.potential(*x)).sum();
         }
         let layer = self.layer_of(&potential);
         let scale = MU_0_T_M_PER_A / (16.0 * PI * PI);
-        dipoles
+        sources
             .iter()
-            .map(|dipole| {
+            .map(|source| {
                 let mut sum = Induced::default();
                 let areas = self.areas_m2.iter().cycle();
                 for (((x, n), v), area) in self.points.iter().zip(layer.as_slice()).zip(areas) {
-                    sum.add_element(minus(dipole.at_m, *x), *n, scale * v * area);
+                    sum.add_element(minus(source.at_m, *x), *n, scale * v * area);
                 }
                 sum
             })
@@ -283,9 +300,69 @@ impl Reaction {
     }
 }
 
+/// Sources side by side: their places, moments and charges. Missing ones have neither moment nor charge.
+fn abreast(sources: &[PointSource]) -> [Lanes; 7] {
+    let mut all = [[0.0; LANES]; 7];
+    for lane in 0..LANES {
+        let last = sources[sources.len() - 1].at_m;
+        let none = PointSource {
+            at_m: last,
+            ..PointSource::default()
+        };
+        let PointSource {
+            at_m: [x, y, z],
+            moment_a_m2: [mx, my, mz],
+            charge_a_m,
+        } = *sources.get(lane).unwrap_or(&none);
+        for (values, value) in all.iter_mut().zip([x, y, z, mx, my, mz, charge_a_m]) {
+            values[lane] = value;
+        }
+    }
+    all.map(Lanes)
+}
+
+/// The potential of sources at points of a surface, and its slope along the normals there, times 4 pi.
+struct Potentials<'a> {
+    points: &'a [([f64; 3], [f64; 3])],
+    sources: &'a [[Lanes; 7]],
+    potential: &'a mut [f64],
+    normal: &'a mut [f64],
+}
+
+impl Kernel for Potentials<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let outputs = self.potential.iter_mut().zip(self.normal);
+        for ((x, n), (phi, slope)) in self.points.iter().zip(outputs) {
+            let scalar = |a: [Lanes; 3], b: [f64; 3]| {
+                let [bx, by, bz] = b.map(Lanes::splat);
+                a[0].mul_add::<FMA>(bx, a[1].mul_add::<FMA>(by, a[2] * bz))
+            };
+            let (mut phis, mut slopes) = (Lanes::splat(0.0), Lanes::splat(0.0));
+            for [px, py, pz, mx, my, mz, charge] in self.sources {
+                let d = [(x[0], px), (x[1], py), (x[2], pz)].map(|(x, p)| Lanes::splat(x) - *p);
+                let square = d[0].mul_add::<FMA>(d[0], d[1].mul_add::<FMA>(d[1], d[2] * d[2]));
+                let inverse_square = Lanes::splat(1.0) / square;
+                let inverse = inverse_square.sqrt();
+                let moment = mx.mul_add::<FMA>(d[0], my.mul_add::<FMA>(d[1], *mz * d[2]));
+                let along = moment * inverse_square;
+                phis = (*charge + along).mul_add::<FMA>(inverse, phis);
+                let by_place = (along * 3.0 + *charge) * scalar(d, *n);
+                let by_moment = scalar([*mx, *my, *mz], *n);
+                slopes = (by_moment - by_place).mul_add::<FMA>(inverse * inverse_square, slopes);
+            }
+            *phi = phis.0.iter().sum();
+            *slope = slopes.0.iter().sum();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fluxform_numerics::vec3::plus;
 
     const SEED: CoreShape = CoreShape {
         radius_m: 0.012,
@@ -299,24 +376,22 @@ mod tests {
         let core = Reaction::new(SEED, 1000.0, &resolution);
         let pair = |shift: [f64; 3]| {
             [
-                Dipole {
+                PointSource {
                     at_m: [0.007 + shift[0], -0.003 + shift[1], 0.013 + shift[2]],
                     moment_a_m2: [0.13, -0.21, 0.7],
+                    charge_a_m: 0.0,
                 },
-                Dipole {
+                PointSource {
                     at_m: [0.011 + shift[0], 0.002 + shift[1], 0.019 + shift[2]],
                     moment_a_m2: [-0.08, 0.11, 0.3],
+                    charge_a_m: 17.0,
                 },
             ]
         };
         let fields = core.induced(&pair([0.0; 3]));
         let mut force = [0.0; 3];
-        for (dipole, field) in pair([0.0; 3]).iter().zip(&fields) {
-            for (j, f) in force.iter_mut().enumerate() {
-                for i in 0..3 {
-                    *f += dipole.moment_a_m2[i] * field.gradient_t_per_m[i][j];
-                }
-            }
+        for (source, field) in pair([0.0; 3]).iter().zip(&fields) {
+            force = plus(force, source.force_n(field));
         }
         let size = force.iter().fold(0.0_f64, |s, f| s.max(f.abs()));
         for (axis, f) in force.iter().enumerate() {
