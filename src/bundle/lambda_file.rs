@@ -365,7 +365,7 @@ pub struct WorstPointFile {
     /// Where t* turns, lambda ascending; between them t* and the currents are linear in lambda.
     pub path: Vec<WorstPointStep>,
     /// Present and true where `path` is empty because it turns too often to be followed; the
-    /// constants and currents hold all the same.
+    /// constants and currents hold all the same, but for a linear one that the error of t* hides: null.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub path_left_out: bool,
 }

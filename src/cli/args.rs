@@ -27,8 +27,9 @@ pub struct Common {
     /// Threads to compute with [default: all cores]; results do not depend on it
     #[arg(long, global = true, hide_short_help = true, value_name = "N", value_parser = values::threads, allow_hyphen_values = true)]
     pub threads: Option<usize>,
-    /// Memory that the run may take, like 20GB [default: three quarters of what is free]; more is
-    /// refused before anything is computed
+    /// Memory that the data of a stage may take, like 20GB [default: three quarters of what is free];
+    /// more is refused before anything is computed. The program itself takes some 50 MB, and data of
+    /// earlier stages up to half as much again
     #[arg(long, global = true, hide_short_help = true, value_name = "SIZE", value_parser = values::memory)]
     pub memory: Option<u64>,
     /// Python that has OpenCASCADE (`pip install cadquery-ocp`), which reads STEP files [default:
@@ -153,7 +154,7 @@ pub struct SurfaceFlags {
     /// Move by so much, in millimetres or with units (0,0,3cm)
     #[arg(long, hide_short_help = true, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
     pub translate: Option<values::Translation>,
-    /// The file's direction that points up: x, y, z, -x, -y or -z [default: z]
+    /// The file's direction that points up: x, y, z, -x, -y or -z [default: z; the y of a GLB, which is up, is its z]
     #[arg(long, hide_short_help = true, value_name = "AXIS", value_parser = values::named::<Up>(), allow_hyphen_values = true)]
     pub up: Option<Up>,
     /// Bring the middle of the surface's box to x = y = 0

@@ -394,6 +394,10 @@ fn least_error(worst_error_n: f64, gap_n: Option<f64>) -> String {
 /// The result of currents for the worst point.
 fn worst_point(worst: &WorstPointFile) -> String {
     let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
+    let linear = match (worst.lambda_linear_n_per_m, worst.lambda_jnd_n_per_m) {
+        (None, Some(_)) => "hidden by the error of the worst point".to_owned(),
+        (linear, _) => constant(linear),
+    };
     let least = worst.worst_error_n.map_or_else(String::new, |least| {
         let relative = worst.relative_worst_error.map_or_else(String::new, |part| {
             format!(" ({} of the largest force)", percent(part))
@@ -401,8 +405,7 @@ fn worst_point(worst: &WorstPointFile) -> String {
         format!("error {}{relative}; ", least_error(least, worst.gap_n))
     });
     format!(
-        "{least}lambda by the worst point: linear {}, jnd {} N/m",
-        constant(worst.lambda_linear_n_per_m),
+        "{least}lambda by the worst point: linear {linear}, jnd {} N/m",
         constant(worst.lambda_jnd_n_per_m)
     )
 }

@@ -58,14 +58,14 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
     if !worst.complete {
         warnings.push(
             "neither the worst-point path could be followed to its end nor its force constants be solved for without it: \
-             they are not known; the least error at the chosen lambda is proven to within its gap; please report this \
-             design and shape"
+             they are not known; the least error at the chosen lambda is proven to within its gap"
                 .to_owned(),
         );
     } else if worst.path.is_none() {
         warnings.push(
             "the worst-point path is left out: with so many coils, or so much symmetry, it turns \
-             too often to be followed; its force constants and currents hold all the same"
+             too often to be followed; its force constants and currents hold all the same, but for \
+             lambda_linear where the error of the worst point hides it"
                 .to_owned(),
         );
     }

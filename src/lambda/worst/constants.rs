@@ -35,6 +35,17 @@ pub(super) struct Constants {
     pub doubt: f64,
 }
 
+impl Constants {
+    /// The share of lambda max h plus the offset above which t* has left t_0.
+    pub(super) fn visible(&self) -> f64 {
+        visible(self.doubt)
+    }
+}
+
+fn visible(doubt: f64) -> f64 {
+    VISIBLE.max(4.0 * doubt)
+}
+
 /// A value and a slope.
 #[derive(Debug, Clone, Copy)]
 struct Line {
@@ -168,7 +179,7 @@ impl Errors<'_, '_> {
 
     /// The rounding error of `t* - t_0` at `lambda`.
     fn visible(&self, lambda: Num) -> Num {
-        Num::of(VISIBLE.max(4.0 * self.doubt)) * (self.top * lambda + self.without)
+        Num::of(visible(self.doubt)) * (self.top * lambda + self.without)
     }
 
     /// The largest lambda with `t* - t_0 <= weight lambda max h`; `None`: all are.

@@ -91,7 +91,7 @@ pub struct WorstPoint {
 /// The worst-point path and the force constants on it.
 #[derive(Debug, Clone)]
 pub struct WorstSolution {
-    /// Where t* leaves t_0, N/m; `None`: it never does.
+    /// Where t* leaves t_0, N/m; `None`: it never does, or, beside a `lambda_jnd_n_per_m`, the error of t* hides it.
     pub lambda_linear_n_per_m: Option<f64>,
     /// The largest with `t* - t_0 <= w lambda max h`, N/m; `None`: all are.
     pub lambda_jnd_n_per_m: Option<f64>,
@@ -186,9 +186,12 @@ pub fn worst_point(
         if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
             let limited = complete.map(|paths| &paths.limited);
             let limited = limited.filter(|limited| sound(limited));
+            let solved = without_path(&scaled, &constants);
+            let linear = solved.lambda_linear_n_per_m;
             return Ok(WorstSolution {
                 path: limited.map(|limited| WorstPath::new(problem, &scaled, limited)),
-                ..without_path(&scaled, &constants)
+                lambda_linear_n_per_m: linear.filter(|_| shows_linear(&constants, solved.floor)),
+                ..solved
             });
         }
     }
@@ -239,6 +242,16 @@ fn read_off(
         path,
         ..without_path(scaled, &constants)
     }
+}
+
+/// Part of the floor that the error of t* may be where it is to show where t* leaves that.
+const HIDES_LINEAR: f64 = 1e-2;
+/// Share of lambda max h of a floor that is as good as none: what is felt least of a force is far more.
+const NO_FLOOR: f64 = 1e-4;
+
+/// Whether t* is solved for so well that it shows where it leaves t_0, `floor` of lambda max h.
+fn shows_linear(constants: &Constants, floor: Option<f64>) -> bool {
+    constants.visible() <= HIDES_LINEAR * floor.unwrap_or(1.0).max(NO_FLOOR)
 }
 
 /// The constants in SI units.
@@ -322,4 +335,28 @@ pub fn least_worst_error(problem: &ForceProblem, lambda_n_per_m: f64) -> WorstPo
         vec![0.0; problem.coils()],
         Vec::new(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 121 and 144 coils that reverse t* is known to 2e-6 and 4.5e-3 of lambda max h, and leaves a floor of 3e-6 of
+    /// it at a tenth and a thousandth of what was stated.
+    #[test]
+    fn regression_a_linear_constant_was_stated_that_the_error_of_the_worst_point_hides() {
+        let shows = |doubt, floor| {
+            let constants = Constants {
+                linear: None,
+                jnd: None,
+                floor: None,
+                doubt,
+            };
+            shows_linear(&constants, floor)
+        };
+        assert!(
+            !shows(2e-6, Some(3e-6)) && !shows(4.5e-3, Some(3e-6)) && !shows(4.5e-3, Some(0.1))
+        );
+        assert!(shows(4e-13, Some(3e-6)) && shows(2e-6, Some(0.01)) && shows(1e-13, Some(0.0)));
+    }
 }
