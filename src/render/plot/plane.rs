@@ -17,7 +17,7 @@ const TITLE_PX: u32 = 14;
 /// Cells along either side, at most: more are drawn together.
 const MOST_CELLS: usize = 100;
 /// Where there is no value.
-pub(super) const NOTHING: &str = "#ffffff";
+const NOTHING: &str = "#ffffff";
 /// Colours that stay apart for the colour-blind and in print, for marks in their order.
 const MARKS: [&str; 6] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000",

@@ -19,7 +19,7 @@ const TITLE_PX: u32 = 14;
 /// Width of a line over the colours, px.
 const LINE_PX: f64 = 1.0;
 /// Where there is no value: in steel or hardly off it, beside a surface.
-pub(super) const NO_VALUE: &str = "#c3c9cf";
+const NO_VALUE: &str = "#c3c9cf";
 /// Colours of the largest negative value and of the largest positive one, which stay apart for the
 /// colour-blind; between them white, which is zero.
 const ENDS: [[f64; 3]; 2] = [[5.0, 48.0, 97.0], [178.0, 24.0, 43.0]];
