@@ -368,6 +368,10 @@ pub struct WorstPointFile {
     /// constants and currents hold all the same, but for a linear one that the error of t* hides: null.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub path_left_out: bool,
+    /// Present and true where both constants are null because they could not be solved for; what holds at the chosen
+    /// lambda does so to within `gap_n`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub constants_unknown: bool,
 }
 
 /// A turn of t*.

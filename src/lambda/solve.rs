@@ -37,6 +37,11 @@ const SMALL: f64 = 1e-6;
 const SHOWN: f64 = 1e-11;
 /// Share of lambda^2 mean(h^2) by which the currents' error may be above e*, or the path is wrong.
 const AGREES: f64 = 1e-8;
+/// A bound on rounding, relative to `lambda^2 mean(h^2)`, above which what is proven at the chosen force constant says
+/// more: it counts the first breakpoints, where currents of nearly dependent columns are huge for next to no force.
+const ROUGH: f64 = 1e-9;
+/// Parts of the chosen force constant at which e* shows how small e_0 is.
+const NEAR_ZERO: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 /// Largest relative violation of optimality that is taken for rounding: its square counts.
 const FLAW: f64 = 1e-8;
 
@@ -583,6 +588,19 @@ fn finish<T: Real>(
         (_, criterion) => constants.of(criterion).map(evaluate),
     };
     let at = settings.at_n_per_m.map(evaluate);
+    let bound = StageAccuracy {
+        estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
+        relative_to: "lambda^2 mean(h^2)".to_owned(),
+        method: "first-order rounding bound of the QR, optimality conditions at every breakpoint"
+            .to_owned(),
+    };
+    let by_jnd = chosen.as_ref().filter(|_| {
+        settings.criterion == Criterion::Jnd && problem.offset_n.is_none() && bound.estimate > ROUGH
+    });
+    let accuracy = by_jnd
+        .map(|chosen| proven::<T>(problem, &path, chosen, rms_height_m))
+        .filter(|proven| proven.estimate < bound.estimate)
+        .unwrap_or(bound);
     Solution {
         constants,
         maxmin_points: maxmin.map_or_else(Vec::new, |maxmin| {
@@ -597,14 +615,29 @@ fn finish<T: Real>(
             Status::Stalled
         },
         precision,
-        accuracy: StageAccuracy {
-            estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
-            relative_to: "lambda^2 mean(h^2)".to_owned(),
-            method:
-                "first-order rounding bound of the QR, optimality conditions at every breakpoint"
-                    .to_owned(),
-        },
+        accuracy,
         path,
+    }
+}
+
+/// The error of e* - e_0 at lambda_jnd as far as it is proven: the duality gap there, and all of e_0, which without an
+/// offset is no larger a part than e* of any currents at any lambda.
+fn proven<T: Real>(
+    problem: &ForceProblem,
+    path: &Path,
+    jnd: &OperatingPoint,
+    rms_height_m: f64,
+) -> StageAccuracy {
+    let square = |lambda: f64| (lambda * rms_height_m).powi(2);
+    let least = NEAR_ZERO.map(|part| part * jnd.lambda_n_per_m).into_iter();
+    let least = least.map(|lambda| {
+        let check = certificate::check::<T>(problem, lambda, &path.currents_a(lambda));
+        check.mean_square_n2 / square(lambda)
+    });
+    StageAccuracy {
+        estimate: jnd.duality_gap_n2 / square(jnd.lambda_n_per_m) + least.fold(1.0, f64::min),
+        relative_to: "lambda^2 mean(h^2)".to_owned(),
+        method: "duality gap at lambda_jnd, and how small e* is at a part of it".to_owned(),
     }
 }
 

@@ -628,10 +628,10 @@ fn turns_report_the_change_of_the_currents() {
     assert!((meets.lambda_n_per_m - 0.7 * 1.3 / 0.05).abs() < 1e-9);
 }
 
-/// Of so many coils side by side neither the path nor the constants may be found, since without limits currents are huge;
-/// no currents at all were given then as the best at any force constant.
+/// Of so many coils side by side neither the path nor a vertex of the problem without limits was found, where currents
+/// are huge, and so no constants.
 #[test]
-fn where_the_constants_are_not_found_the_error_at_one_is() {
+fn regression_the_constants_of_many_coils_that_reverse_were_not_found() {
     let mut random = Random::new(1301);
     let place = |k: usize, side: usize, pitch: f64| {
         let at = |i: usize| pitch * (i as f64 - 0.5 * (side - 1) as f64);
@@ -661,9 +661,13 @@ fn where_the_constants_are_not_found_the_error_at_one_is() {
         ohm: vec![6.0; 169],
     };
     let solution = solved(&case);
-    assert!(!solution.complete, "{solution:?}");
-    let point = solution.at(&case.problem(), 1.8);
-    let requested = 1.8 * top(&case);
-    assert!(point.worst_error_n < 0.5 * requested);
+    assert!(solution.complete && solution.path.is_none(), "{solution:?}");
+    let jnd = solution.lambda_jnd_n_per_m.expect("binds");
+    let floor = solution.floor.expect("no offset");
+    let point = solution.at(&case.problem(), jnd);
+    let requested = jnd * top(&case);
     assert!(point.gap_n < 1e-9 * point.worst_error_n, "{}", point.gap_n);
+    let felt = floor + Settings::default().jnd_weight;
+    let off = point.worst_error_n / requested - felt;
+    assert!(off.abs() < 1e-8 && floor < 1e-6, "{floor} {off}");
 }

@@ -143,6 +143,7 @@ impl PosedProblem<'_> {
             gap_n: point.map(|point| point.gap_n),
             active: point.map(|point| point.active.clone()),
             path_left_out: worst.path.is_none(),
+            constants_unknown: !worst.complete,
             path: worst
                 .path
                 .iter()

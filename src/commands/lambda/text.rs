@@ -393,7 +393,17 @@ fn least_error(worst_error_n: f64, gap_n: Option<f64>) -> String {
 
 /// The result of currents for the worst point.
 fn worst_point(worst: &WorstPointFile) -> String {
-    let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
+    let missing = if worst.constants_unknown {
+        "not known"
+    } else {
+        "none"
+    };
+    let constant = |lambda: Option<f64>| {
+        lambda.map_or_else(
+            || missing.to_owned(),
+            |lambda| format!("{} N/m", number(lambda)),
+        )
+    };
     let linear = match (worst.lambda_linear_n_per_m, worst.lambda_jnd_n_per_m) {
         (None, Some(_)) => "hidden by the error of the worst point".to_owned(),
         (linear, _) => constant(linear),
@@ -405,7 +415,7 @@ fn worst_point(worst: &WorstPointFile) -> String {
         format!("error {}{relative}; ", least_error(least, worst.gap_n))
     });
     format!(
-        "{least}lambda by the worst point: linear {linear}, jnd {} N/m",
+        "{least}lambda by the worst point: linear {linear}, jnd {}",
         constant(worst.lambda_jnd_n_per_m)
     )
 }

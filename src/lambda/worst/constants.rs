@@ -5,20 +5,25 @@
 //! allowed (Newton's method, which ends on the piece that decides). t_0 is a line without an offset;
 //! with one it is convex too, and below the chord between any two of its values.
 
-use super::doubles::{Doubles, Failure, Optimum};
+use super::doubles::Doubles;
+use super::interior::Interior;
 use super::scaled::{Form, Limits, Scaled};
 use crate::problem::ForceProblem;
 use crate::qr_reduction::{largest_entries, times_power};
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-/// Above this share of lambda max h, or of what rounding may hide, t* has left t_0.
+/// Above this share of lambda max h, or of what may hide it, t* has left t_0.
 const VISIBLE: f64 = 1e-12;
+/// The same in gaps of the two.
+const VISIBLE_GAPS: f64 = 4.0;
 /// The same where t_0 is zero.
 const ALMOST_NONE: f64 = 1e-14;
 /// A scaled lambda above which no limit begins to bind: 1 is a force near the largest of one coil.
 const FAR: f64 = (1 << 20) as f64;
-/// A doubt beyond which doubles do not lead to the constants, without a leeway and with one.
+/// A multiple of where the lines from there lead.
+const NEAR: f64 = 4.0;
+/// Shares of the largest force by which t* is not known at a vertex, or within: then nothing is.
 const MOST_DOUBT: [f64; 2] = [1e-6, 1e-2];
 /// More lines than lead to any constant.
 const LINES: usize = 200;
@@ -26,82 +31,84 @@ const LINES: usize = 200;
 /// Force constants, in scaled units.
 pub(super) struct Constants {
     /// Where t* leaves t_0.
-    pub linear: Option<Num>,
+    pub linear: Option<f64>,
     /// The largest lambda with `t* - t_0 <= weight lambda max h`.
-    pub jnd: Option<Num>,
+    pub jnd: Option<f64>,
     /// t_0 at lambda = 1; `None` with an offset.
-    pub floor: Option<Num>,
-    /// Share of lambda max h plus the offset that rounding may hide.
+    pub floor: Option<f64>,
+    /// Share of lambda max h plus the offset by which t* may be off where they are read off.
     pub doubt: f64,
+    /// How that is estimated.
+    pub method: &'static str,
 }
+
+/// How the error of t* is estimated at vertices.
+pub(super) const OF_VERTICES: &str =
+    "rounding of the forces of the points that are not in the program";
+/// The same of the interior-point method.
+const OF_CENTRES: &str = "gap of the proof where the constants are read off";
 
 impl Constants {
     /// The share of lambda max h plus the offset above which t* has left t_0.
     pub(super) fn visible(&self) -> f64 {
-        visible(self.doubt)
+        VISIBLE.max(VISIBLE_GAPS * self.doubt)
     }
 }
 
-fn visible(doubt: f64) -> f64 {
-    VISIBLE.max(4.0 * doubt)
-}
-
-/// A value and a slope.
+/// A value, how far below it the least may be, and a slope.
 #[derive(Debug, Clone, Copy)]
 struct Line {
-    lambda: Num,
-    value: Num,
-    slope: Num,
+    lambda: f64,
+    value: f64,
+    gap: f64,
+    slope: f64,
 }
 
-impl Line {
-    fn of(optimum: &Optimum) -> Self {
-        let piece = &optimum.piece;
-        let last = piece.z.len() - 1;
-        Self {
-            lambda: piece.start,
-            value: piece.z[last],
-            slope: piece.rate[last],
-        }
-    }
-
-    fn at(&self, lambda: Num) -> Num {
-        self.value + (lambda - self.lambda) * self.slope
-    }
+/// Solves for the constants of `limited` against `free`, the same without the drivers' size, at vertices; `None` where
+/// doubles do not lead to one, or t* is in too much doubt.
+pub(super) fn by_vertices(limited: &Scaled, free: &Scaled, weight: f64) -> Option<Constants> {
+    let vertices = |scaled| Optima::Vertices(Box::new(Doubles::new(scaled, Form::Worst)));
+    constants([limited, free].map(vertices), limited, weight, OF_VERTICES)
 }
 
-/// Solves for the constants of `limited` against `free`, the same without the drivers' size.
-///
-/// # Errors
-/// Where one of the programs has no solution in doubles, or only one in too much doubt.
-pub(super) fn constants(
-    limited: &Scaled,
-    free: &Scaled,
+/// The same by the interior-point method.
+pub(super) fn by_centres(limited: &Scaled, free: &Scaled, weight: f64) -> Option<Constants> {
+    let centres = |scaled| Optima::Centres(Box::new(Interior::new(scaled)));
+    constants([limited, free].map(centres), limited, weight, OF_CENTRES)
+}
+
+fn constants(
+    [limited, free]: [Optima; 2],
+    scaled: &Scaled,
     weight: f64,
-) -> Result<Constants, Failure> {
+    method: &'static str,
+) -> Option<Constants> {
+    let offset_n = scaled.offset_n();
     let mut errors = Errors {
-        limited: Doubles::new(limited, Form::Worst),
-        free: Doubles::new(free, Form::Worst),
+        limited,
+        free,
         proportional: None,
-        top: limited.top(),
-        without: Num::ZERO,
+        top: scaled.top().to_f64(),
+        without: 0.0,
         doubt: 0.0,
-        most_doubt: MOST_DOUBT[usize::from(limited.leeway > 0.0)],
     };
-    if free.offset_n() == 0.0 {
-        errors.proportional = Some(errors.free_line(Num::ONE)?);
+    if offset_n == 0.0 {
+        let line = errors.free_line(1.0)?;
+        errors.doubt = line.gap / errors.size(1.0);
+        errors.proportional = Some(line);
     }
-    errors.without = errors.limited_line(Num::ZERO)?.value.larger(Num::ZERO);
-    let linear = errors.largest_within(Num::ZERO)?;
+    errors.without = errors.limited_line(0.0)?.value.max(0.0);
+    let linear = errors.largest_within(0.0)?;
     let jnd = match linear {
-        Some(_) if weight > 0.0 => errors.largest_within(Num::of(weight))?,
+        Some(_) if weight > 0.0 => errors.largest_within(weight)?,
         other => other,
     };
-    Ok(Constants {
+    Some(Constants {
         linear,
         jnd,
         floor: errors.proportional.map(|line| line.value),
         doubt: errors.doubt,
+        method,
     })
 }
 
@@ -115,10 +122,12 @@ pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, 
     let mut lambda = Num::of(FAR);
     for _ in 0..LINES {
         fluxform_base::progress::poll();
-        let line = Line::of(&limited.at(lambda).ok()?);
+        let piece = limited.at(lambda).ok()?.piece;
+        let last = piece.z.len() - 1;
+        let (value, slope) = (piece.z[last], piece.rate[last]);
         // A tangent of a convex function leads from above to where it is zero, or stays above.
-        let step = line.value / line.slope;
-        if line.value <= Num::of(ALMOST_NONE) * scaled.top() * lambda
+        let step = value / slope;
+        if value <= Num::of(ALMOST_NONE) * scaled.top() * lambda
             || step <= Num::of(VISIBLE) * lambda
         {
             lambda = lambda * Num::of(share);
@@ -135,62 +144,52 @@ pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, 
 
 /// t* and t_0 at one lambda at a time.
 struct Errors<'s, 'a> {
-    limited: Doubles<'s, 'a>,
-    free: Doubles<'s, 'a>,
+    limited: Optima<'s, 'a>,
+    free: Optima<'s, 'a>,
     /// t_0 where it is a line.
     proportional: Option<Line>,
-    top: Num,
+    top: f64,
     /// t* without currents' need: at lambda = 0.
-    without: Num,
+    without: f64,
     doubt: f64,
-    most_doubt: f64,
 }
 
 impl Errors<'_, '_> {
-    fn limited_line(&mut self, lambda: Num) -> Result<Line, Failure> {
-        let optimum = self.limited.at(lambda)?;
-        self.line(&optimum)
+    fn limited_line(&mut self, lambda: f64) -> Option<Line> {
+        self.limited.line(lambda)
     }
 
-    fn free_line(&mut self, lambda: Num) -> Result<Line, Failure> {
+    fn free_line(&mut self, lambda: f64) -> Option<Line> {
         if let Some(line) = self.proportional {
-            return Ok(Line {
+            return Some(Line {
                 lambda,
-                value: line.at(lambda),
+                value: lambda * line.value,
+                gap: lambda * line.gap,
                 slope: line.slope,
             });
         }
-        let optimum = self.free.at(lambda)?;
-        self.line(&optimum)
+        self.free.line(lambda)
     }
 
-    /// The line at an optimum, unless it is in too much doubt.
-    fn line(&mut self, optimum: &Optimum) -> Result<Line, Failure> {
-        let line = Line::of(optimum);
-        let size = (line.lambda * self.top + self.without).to_f64();
-        if size > 0.0 {
-            self.doubt = self.doubt.max(optimum.doubt / size);
-        }
-        if self.doubt > self.most_doubt {
-            return Err(Failure::Stalled);
-        }
-        Ok(line)
+    fn size(&self, lambda: f64) -> f64 {
+        self.top * lambda + self.without
     }
 
-    /// The rounding error of `t* - t_0` at `lambda`.
-    fn visible(&self, lambda: Num) -> Num {
-        Num::of(visible(self.doubt)) * (self.top * lambda + self.without)
+    /// What may hide `t* - t_0`.
+    fn visible(&self, [t, free]: [Line; 2]) -> f64 {
+        (VISIBLE * self.size(t.lambda)).max(VISIBLE_GAPS * (t.gap + free.gap))
     }
 
-    /// The largest lambda with `t* - t_0 <= weight lambda max h`; `None`: all are.
-    fn largest_within(&mut self, weight: Num) -> Result<Option<Num>, Failure> {
+    /// The largest lambda with `t* - t_0 <= weight lambda max h`; `Some(None)`: all are.
+    fn largest_within(&mut self, weight: f64) -> Option<Option<f64>> {
         let share = weight * self.top;
-        let mut low = self.free_line(Num::ZERO)?;
-        let far = Num::of(FAR);
-        let mut high = [self.limited_line(far)?, self.free_line(far)?];
+        // With a weight t* crosses what is allowed at an angle.
+        let grain = if weight > 0.0 { 1e-3 } else { 1.0 };
+        let mut low = self.free_line(0.0)?;
+        let mut high = [self.limited_line(FAR)?, self.free_line(FAR)?];
         let excess = |[t, free]: [Line; 2]| t.value - free.value - share * t.lambda;
-        if excess(high) <= self.visible(far) {
-            return Ok(None);
+        if excess(high) <= self.visible(high) {
+            return Some(None);
         }
         for _ in 0..LINES {
             fluxform_base::progress::poll();
@@ -200,18 +199,17 @@ impl Errors<'_, '_> {
             let chord = (high[1].value - low.value) / (at - low.lambda);
             let rate = high[0].slope - chord - share;
             let by_chord = at - above / rate;
-            if above <= self.rounding(at, weight) || rate <= Num::ZERO {
-                return Ok(Some(at));
+            if above <= grain * self.visible(high) || rate <= 0.0 {
+                break;
             }
             if by_chord <= low.lambda {
-                return Ok(Some(low.lambda.larger(Num::ZERO)));
+                return Some(Some(low.lambda.max(0.0)));
             }
             // The tangent of t_0 leads further where t_0 bends: there the chord is steeper.
-            let by_tangent =
-                at - above / (high[0].slope - high[1].slope - share).larger(rate * Num::of(0.25));
+            let by_tangent = at - above / (high[0].slope - high[1].slope - share).max(0.25 * rate);
             let next = if by_tangent < by_chord && by_tangent > low.lambda {
                 let near = [self.limited_line(by_tangent)?, self.free_line(by_tangent)?];
-                if excess(near) <= self.rounding(by_tangent, weight) {
+                if excess(near) <= grain * self.visible(near) {
                     low = near[1];
                     by_chord
                 } else if near[0].slope - near[1].slope >= share {
@@ -223,18 +221,50 @@ impl Errors<'_, '_> {
             } else {
                 by_chord
             };
+            // Lines from so far are rounded by more than those from near.
+            let next = if at == FAR { NEAR * next } else { next };
             high = [self.limited_line(next)?, self.free_line(next)?];
         }
-        Ok(Some(high[0].lambda))
+        let gap = high[0].gap + high[1].gap;
+        self.doubt = self.doubt.max(gap / self.size(high[0].lambda));
+        Some(Some(high[0].lambda))
     }
+}
 
-    /// An excess that ends the search: with a weight t* crosses what is allowed at an angle.
-    fn rounding(&self, lambda: Num, weight: Num) -> Num {
-        if weight > Num::ZERO {
-            Num::of(1e-3) * self.visible(lambda)
-        } else {
-            self.visible(lambda)
-        }
+/// What finds the least largest error at one lambda after another.
+enum Optima<'s, 'a> {
+    Vertices(Box<Doubles<'s, 'a>>),
+    Centres(Box<Interior<'s, 'a>>),
+}
+
+impl Optima<'_, '_> {
+    /// The line at `lambda`, unless it is in too much doubt.
+    fn line(&mut self, lambda: f64) -> Option<Line> {
+        let (line, most) = match self {
+            Self::Vertices(doubles) => {
+                let optimum = doubles.at(Num::of(lambda)).ok()?;
+                let piece = &optimum.piece;
+                let last = piece.z.len() - 1;
+                let line = Line {
+                    lambda,
+                    value: piece.z[last].to_f64(),
+                    gap: optimum.doubt,
+                    slope: piece.rate[last].to_f64(),
+                };
+                (line, MOST_DOUBT[0] * doubles.size(lambda))
+            }
+            Self::Centres(interior) => {
+                let centre = interior.at(lambda);
+                let line = Line {
+                    lambda,
+                    value: centre.worst,
+                    gap: centre.gap,
+                    slope: centre.slope,
+                };
+                (line, MOST_DOUBT[1] * centre.size)
+            }
+        };
+        (line.gap <= most || lambda == 0.0).then_some(line)
     }
 }
 
@@ -276,34 +306,24 @@ mod tests {
         let by_path = worst_point(&problem, &settings).unwrap();
         assert!(by_path.path.is_some() && by_path.complete);
         let largest = largest_entries(&problem);
-        let without_path = |leeway| {
-            let [limited, free] = [Limits::All, Limits::Lower].map(|limits| {
-                let mut scaled = Scaled::new(&problem, &largest, Form::Worst, limits);
-                scaled.leeway = leeway;
-                scaled
-            });
-            let constants = constants(&limited, &free, settings.jnd_weight).ok();
-            super::super::without_path(&limited, &constants.unwrap())
-        };
-        let alone = without_path(0.0);
-        let pairs = [
-            (alone.lambda_linear_n_per_m, by_path.lambda_linear_n_per_m),
-            (alone.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m),
-            (alone.floor, by_path.floor),
-        ];
-        for (alone, by_path) in pairs {
+        let [limited, free] = [Limits::All, Limits::Lower]
+            .map(|limits| Scaled::new(&problem, &largest, Form::Worst, limits));
+        let alone = [by_vertices, by_centres].map(|constants| {
+            let constants = constants(&limited, &free, settings.jnd_weight).unwrap();
+            super::super::without_path(&limited, &constants)
+        });
+        let pairs = alone.each_ref().map(|alone| {
+            [
+                (alone.lambda_linear_n_per_m, by_path.lambda_linear_n_per_m),
+                (alone.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m),
+                (alone.floor, by_path.floor),
+            ]
+        });
+        for (alone, by_path) in pairs.into_iter().flatten() {
             let (alone, by_path) = (alone.unwrap(), by_path.unwrap());
             assert!((alone / by_path - 1.0).abs() < 1e-10, "{alone} {by_path}");
         }
-        let point = super::super::least_worst_error(&problem, alone.lambda_jnd_n_per_m.unwrap());
+        let point = super::super::least_worst_error(&problem, alone[0].lambda_jnd_n_per_m.unwrap());
         assert!(point.gap_n < 1e-12 * point.worst_error_n, "{point:?}");
-        // A leeway moves t* by no more than it says.
-        let near = without_path(1e-6);
-        let stated = near.accuracy.estimate;
-        assert!((1e-6..1e-5).contains(&stated), "{stated}");
-        assert!((near.floor.unwrap() - by_path.floor.unwrap()).abs() < stated);
-        let (near, by_path) = (near.lambda_jnd_n_per_m, by_path.lambda_jnd_n_per_m);
-        let off = near.unwrap() / by_path.unwrap() - 1.0;
-        assert!(off.abs() < 4.0 * stated / settings.jnd_weight, "{off}");
     }
 }

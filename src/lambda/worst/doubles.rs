@@ -22,8 +22,6 @@ use fluxform_numerics::real::Real;
 
 /// Raise of the costs, relative to that of the minimised variable.
 const RAISE: f64 = 1e-7;
-/// The same where points may be missed by a share of the largest force: nothing takes it away again.
-const RAISE_WITH_LEEWAY: f64 = 1e-10;
 /// Multipliers that differ by less are equal, in units of the raise.
 const TIE: f64 = 0.01;
 /// Rounding of a force summed in doubles, in units of the terms' sizes.
@@ -48,8 +46,6 @@ const TASK: usize = 128 * CHUNK;
 const PATIENCE: usize = 200;
 /// Multiplications after which all programs of one problem are given up: seconds.
 const WORK: usize = 60_000_000_000;
-/// The same where points may be missed by a share of the largest force: a minute or two.
-const WORK_WITH_LEEWAY: usize = 200_000_000_000;
 /// Turns from one method to the other.
 const TURNS: usize = 8;
 /// Corrections of a solution in double-double.
@@ -132,11 +128,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
             matrix: Vec::new(),
             inverse: Vec::new(),
             exchanges: 0,
-            work: if scaled.leeway > 0.0 {
-                WORK_WITH_LEEWAY
-            } else {
-                WORK
-            },
+            work: WORK,
             random: Random::new(1),
         }
     }
@@ -144,6 +136,12 @@ impl<'s, 'a> Doubles<'s, 'a> {
     /// Points and signs of the rows of an optimum; `None` for limits.
     pub fn rows(&self) -> &[Option<(usize, bool)>] {
         &self.rows
+    }
+
+    /// The largest force that may be requested at `lambda`.
+    pub fn size(&self, lambda: f64) -> f64 {
+        let [constant, slope] = self.program.size();
+        constant + lambda * slope
     }
 
     fn width(&self) -> usize {
@@ -156,14 +154,9 @@ impl<'s, 'a> Doubles<'s, 'a> {
         if self.inverse.is_empty() {
             self.renew()?;
         }
-        let leeway = self.scaled.leeway > 0.0;
-        let mut raise = if leeway { RAISE_WITH_LEEWAY } else { RAISE };
+        let mut raise = RAISE;
         for _ in 0..TURNS {
             self.dual(lambda.to_f64(), raise, limit)?;
-            // What the raise has moved is in the doubt.
-            if leeway {
-                break;
-            }
             let moved = self.primal(lambda.to_f64(), limit)?;
             if !moved || !self.misses(lambda.to_f64()) {
                 break;
@@ -173,13 +166,11 @@ impl<'s, 'a> Doubles<'s, 'a> {
         Ok(self.finish(lambda))
     }
 
-    /// Rows below their bounds by less are met, in scaled units: what rounding leaves of forces, and
-    /// the leeway.
+    /// Rows below their bounds by less are met, in scaled units: what rounding leaves of forces.
     fn met(&self, lambda: f64, z: &[f64]) -> f64 {
-        let [constant, slope] = self.program.size();
-        let requested = constant + lambda * slope;
+        let requested = self.size(lambda);
         let pushed: f64 = z.iter().map(|x| 2.0 * x.abs()).sum();
-        ROUNDINGS * f64::EPSILON * (requested + pushed) + self.scaled.leeway * requested + 1e-25
+        ROUNDINGS * f64::EPSILON * (requested + pushed) + 1e-25
     }
 
     fn bound(&self, row: usize, lambda: f64) -> f64 {
@@ -410,7 +401,7 @@ impl<'s, 'a> Doubles<'s, 'a> {
         }
     }
 
-    /// The condition on all points at `z`, without the leeway of rounding.
+    /// The condition on all points at `z`, without room for rounding.
     fn probe(&self, lambda: f64, z: &[f64]) -> Probe {
         let wide: Vec<Num> = z.iter().map(|&v| Num::of(v)).collect();
         let last = z[z.len() - 1];

@@ -16,8 +16,7 @@
 //!
 //! The path is followed where that is little work. Of arrays whose path turns more often than that,
 //! or stands still at turns where symmetry lets many points decide at once, the constants alone are
-//! solved for, and the currents at any one lambda; where even these are much work, up to a stated
-//! share of the largest force.
+//! solved for, and the currents at any one lambda, to within the gap of their proof.
 //!
 //! Where several currents are equally good, a vertex is returned: of coils that cannot pull, the one
 //! with the least sum of currents.
@@ -28,6 +27,7 @@ mod constraint_generation;
 mod criteria;
 mod doubles;
 mod free;
+mod interior;
 mod maxmin;
 mod path;
 mod perceptual_tolerance;
@@ -50,23 +50,23 @@ use fluxform_numerics::real::Real;
 
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::qr_reduction::{largest_entries, times_power};
-use constants::{Constants, constants};
+use constants::{Constants, OF_VERTICES, by_centres, by_vertices};
 use constraint_generation::{Followed, Search};
 use criteria::Comparison;
 use doubles::Doubles;
 use free::FreeProblem;
+use interior::Interior;
 use program::{End, Work};
 use scaled::{Form, Limits, Scaled};
 
 /// Shares of lambda max h by which points may be missed where rounding leads a path astray that
 /// misses none; the estimated error states it.
 const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
-
-/// The same where the constants alone take too much work in doubles otherwise: coils side by side
-/// whose forces are nearly those of their neighbours.
-const LEEWAY_OF_CONSTANTS: f64 = 1e-6;
 /// Rounding of forces, relative to the largest that is requested, from which on it has led a path's currents astray.
 const ASTRAY: f64 = 1e-2;
+
+/// Share of the largest force that a gap may be.
+const PROVEN: f64 = 1e-12;
 
 /// Work that the path may take, both with the drivers' size and without.
 const WORK: Work = Work(10_000_000);
@@ -180,32 +180,33 @@ pub fn worst_point(
     if let Some(paths) = complete.filter(|paths| both_sound(paths)) {
         return Ok(read_off(problem, settings, &scaled, paths));
     }
-    for leeway in [0.0, LEEWAY_OF_CONSTANTS] {
-        scaled.leeway = leeway;
-        free.leeway = leeway;
-        if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
-            let limited = complete.map(|paths| &paths.limited);
-            let limited = limited.filter(|limited| sound(limited));
-            let solved = without_path(&scaled, &constants);
-            let linear = solved.lambda_linear_n_per_m;
-            return Ok(WorstSolution {
-                path: limited.map(|limited| WorstPath::new(problem, &scaled, limited)),
-                lambda_linear_n_per_m: linear.filter(|_| shows_linear(&constants, solved.floor)),
-                ..solved
-            });
-        }
-    }
-    scaled.leeway = 0.0;
-    // What was followed of a path is not checked at all points.
-    let unknown = Constants {
-        linear: None,
-        jnd: None,
-        floor: None,
-        doubt: 1.0,
+    let weight = settings.jnd_weight;
+    // Without limits currents of drivers that reverse are huge: no vertex of those is found in doubles.
+    let at_vertices = open.is_none().then(|| by_vertices(&scaled, &free, weight));
+    let open = Scaled::new(problem, &largest, Form::Worst, Limits::Lower);
+    let constants = at_vertices.flatten();
+    let Some(constants) = constants.or_else(|| by_centres(&scaled, &open, weight)) else {
+        // What was followed of a path is not checked at all points.
+        let unknown = Constants {
+            linear: None,
+            jnd: None,
+            floor: None,
+            doubt: 1.0,
+            method: OF_VERTICES,
+        };
+        return Ok(WorstSolution {
+            complete: false,
+            ..without_path(&scaled, &unknown)
+        });
     };
+    let limited = complete.map(|paths| &paths.limited);
+    let limited = limited.filter(|limited| sound(limited));
+    let solved = without_path(&scaled, &constants);
+    let linear = solved.lambda_linear_n_per_m;
     Ok(WorstSolution {
-        complete: false,
-        ..without_path(&scaled, &unknown)
+        path: limited.map(|limited| WorstPath::new(problem, &scaled, limited)),
+        lambda_linear_n_per_m: linear.filter(|_| shows_linear(&constants, solved.floor)),
+        ..solved
     })
 }
 
@@ -233,10 +234,11 @@ fn read_off(
     let slope = first.map(|piece| piece.rate[piece.rate.len() - 1]);
     let path = Some(WorstPath::new(problem, scaled, &paths.limited));
     let constants = Constants {
-        linear,
-        jnd,
-        floor: slope.filter(|_| scaled.offset_n() == 0.0),
+        linear: linear.map(Num::to_f64),
+        jnd: jnd.map(Num::to_f64),
+        floor: slope.filter(|_| scaled.offset_n() == 0.0).map(Num::to_f64),
         doubt: comparison.doubt,
+        method: OF_VERTICES,
     };
     WorstSolution {
         path,
@@ -257,8 +259,8 @@ fn shows_linear(constants: &Constants, floor: Option<f64>) -> bool {
 /// The constants in SI units.
 fn without_path(scaled: &Scaled, constants: &Constants) -> WorstSolution {
     let expected = scaled.height_m() > 0.0;
-    let si = |lambda: Num| times_power(lambda.to_f64(), scaled.lambda_unit());
-    let floor = |slope: Num| (slope / scaled.top()).to_f64().max(0.0);
+    let si = |lambda: f64| times_power(lambda, scaled.lambda_unit());
+    let floor = |slope: f64| (slope / scaled.top().to_f64()).max(0.0);
     WorstSolution {
         lambda_linear_n_per_m: constants.linear.filter(|_| expected).map(si),
         lambda_jnd_n_per_m: constants.jnd.filter(|_| expected).map(si),
@@ -268,12 +270,7 @@ fn without_path(scaled: &Scaled, constants: &Constants) -> WorstSolution {
         accuracy: StageAccuracy {
             estimate: constants.doubt,
             relative_to: "lambda max h".to_owned(),
-            method: if scaled.leeway > 0.0 {
-                "share of the largest force by which points may be missed, and rounding"
-            } else {
-                "rounding of the forces of the points that are not in the program"
-            }
-            .to_owned(),
+            method: constants.method.to_owned(),
         },
     }
 }
@@ -292,6 +289,12 @@ impl WorstSolution {
 }
 
 impl WorstPoint {
+    /// Whether the gap of the proof is nothing beside the largest force.
+    fn proven(&self) -> bool {
+        let share = self.relative_worst_error.filter(|&share| share > 0.0);
+        self.gap_n <= PROVEN * self.worst_error_n / share.unwrap_or(1.0)
+    }
+
     fn new(
         problem: &ForceProblem,
         lambda_n_per_m: f64,
@@ -313,28 +316,29 @@ impl WorstPoint {
     }
 }
 
-/// The least largest error at one force constant, without the path. Where doubles do not lead to it
-/// there are no currents, which the proof then shows. The problem must be well formed.
+/// The least largest error at one force constant, without the path: at a vertex, or where doubles do not lead to
+/// one, as near to it as the proof shows. The problem must be well formed.
 #[must_use]
 pub fn least_worst_error(problem: &ForceProblem, lambda_n_per_m: f64) -> WorstPoint {
     let largest = largest_entries(problem);
-    let mut scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
-    let lambda = Num::of(times_power(lambda_n_per_m, -scaled.lambda_unit()));
-    for leeway in [0.0, LEEWAY_OF_CONSTANTS] {
-        scaled.leeway = leeway;
-        let mut doubles = Doubles::new(&scaled, Form::Worst);
-        if let Ok(optimum) = doubles.at(lambda) {
-            let currents_a = scaled.currents_a(&optimum.piece.z);
-            let active = path::active(doubles.rows(), &optimum.piece);
-            return WorstPoint::new(problem, lambda_n_per_m, currents_a, active);
+    let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
+    let lambda = times_power(lambda_n_per_m, -scaled.lambda_unit());
+    let mut doubles = Doubles::new(&scaled, Form::Worst);
+    let new = |currents_a, active| WorstPoint::new(problem, lambda_n_per_m, currents_a, active);
+    let vertex = doubles.at(Num::of(lambda)).ok().map(|optimum| {
+        let active = path::active(doubles.rows(), &optimum.piece);
+        new(scaled.currents_a(&optimum.piece.z), active)
+    });
+    match vertex {
+        Some(vertex) if vertex.proven() => vertex,
+        other => {
+            let centre = Interior::new(&scaled).at(lambda);
+            let centre = new(centre.currents_a, centre.active);
+            other
+                .filter(|vertex| vertex.gap_n < centre.gap_n)
+                .unwrap_or(centre)
         }
     }
-    WorstPoint::new(
-        problem,
-        lambda_n_per_m,
-        vec![0.0; problem.coils()],
-        Vec::new(),
-    )
 }
 
 #[cfg(test)]
@@ -351,6 +355,7 @@ mod tests {
                 jnd: None,
                 floor: None,
                 doubt,
+                method: OF_VERTICES,
             };
             shows_linear(&constants, floor)
         };

@@ -12,6 +12,8 @@ use crate::qr_reduction::{exponent_of, times_power};
 
 /// Rounding residue of a scaled current, or force per ampere, of zero.
 pub(super) const NOTHING: f64 = 1e-24;
+/// Exponent of a current whose square is a number.
+const MOST_AMPERES: i32 = 511;
 /// Exchanges per variable that a program takes at least.
 const EXCHANGES: usize = 4;
 
@@ -46,6 +48,25 @@ pub(super) struct Scaled<'a> {
     pub leeway: f64,
     /// The coils that have any effect, on forces or on what others may carry.
     pub live: Vec<usize>,
+}
+
+/// Limits of a problem.
+pub(super) struct Near {
+    lower_a: Vec<f64>,
+    upper_a: Vec<f64>,
+    total_max_a: Option<f64>,
+}
+
+impl Near {
+    /// The same points with these.
+    pub fn problem<'a>(&'a self, problem: &ForceProblem<'a>) -> ForceProblem<'a> {
+        ForceProblem {
+            lower_a: &self.lower_a,
+            upper_a: &self.upper_a,
+            total_max_a: self.total_max_a,
+            ..*problem
+        }
+    }
 }
 
 impl<'a> Scaled<'a> {
@@ -156,6 +177,141 @@ impl<'a> Scaled<'a> {
             }
         }
         currents
+    }
+
+    /// Force of coil `live[k]` at point `j`.
+    pub fn force(&self, j: usize, k: usize) -> f64 {
+        let i = self.live[k];
+        let force = self.problem.forces_n_per_a[j * self.problem.coils() + i];
+        times_power(force, -self.column(i))
+    }
+
+    /// Height of point `j`.
+    pub fn height_of(&self, j: usize) -> f64 {
+        times_power(self.problem.height_m[j], -self.height())
+    }
+
+    /// What currents are to give at point `j`: lambda h - offset.
+    pub fn wanted(&self, j: usize, lambda: f64) -> f64 {
+        let offset_n = self.problem.offset_n.map_or(0.0, |offset| offset[j]);
+        lambda * self.height_of(j) - times_power(offset_n, -self.force)
+    }
+
+    /// The limits' rows, without t, and what they are at least. Of drivers that reverse none is left without their size.
+    pub fn limits(&self) -> Vec<(Vec<f64>, f64)> {
+        let n = self.live.len();
+        if self.limits == Limits::All {
+            let program = self.bounds();
+            let row = |r| {
+                let row: Vec<f64> = program.coefficients(r).iter().map(|v| v.to_f64()).collect();
+                (row[..n].to_vec(), program.bound(r).0.to_f64())
+            };
+            return (0..program.rows()).map(row).collect();
+        }
+        let one_way = |(k, &i): (usize, &usize)| {
+            let go = self.problem.directions(i);
+            let mut row = vec![0.0; n];
+            row[k] = if go.up { 1.0 } else { -1.0 };
+            (go.up != go.down).then_some((row, 0.0))
+        };
+        self.live.iter().enumerate().filter_map(one_way).collect()
+    }
+
+    /// Whether every current has both limits.
+    pub fn bounded(&self) -> bool {
+        self.limits == Limits::All
+    }
+
+    /// What the scaled currents range over, as powers of two; 1 without the drivers' size, but no more than has square
+    /// amperes.
+    pub fn ranges(&self) -> Vec<f64> {
+        let range = |&i: &usize| {
+            let exponent = if self.bounded() {
+                exponent_of(self.problem.upper_a[i] - self.problem.lower_a[i])
+            } else {
+                (self.force - self.column(i)).min(MOST_AMPERES)
+            };
+            times_power(1.0, exponent + self.column(i) - self.force)
+        };
+        self.live.iter().map(range).collect()
+    }
+
+    /// Scaled currents in the middle of their limits; half as much below zero's side of them as keeps their sum too.
+    pub fn middle(&self) -> Vec<f64> {
+        let problem = self.problem;
+        let middle = |lower: f64, upper: f64, part: f64| lower + part * (upper - lower);
+        let [lowest, highest] =
+            [problem.lower_a, problem.upper_a].map(|limits| limits.iter().sum::<f64>());
+        let share = |most: f64| (0.5 * (most - lowest) / (highest - lowest)).min(0.5);
+        let part = problem
+            .total_max_a
+            .filter(|_| self.bounded())
+            .map_or(0.5, share);
+        let all = self.live.iter().map(|&i| {
+            let current = if self.bounded() {
+                middle(problem.lower_a[i], problem.upper_a[i], part)
+            } else {
+                let go = problem.directions(i);
+                f64::from(u8::from(go.up)) - f64::from(u8::from(go.down))
+            };
+            times_power(current, self.column(i) - self.force)
+        });
+        all.collect()
+    }
+
+    /// Currents of all coils, A, nearest to scaled ones and within the limits of [`Self::limits`].
+    pub fn nearest_a(&self, x: &[f64]) -> Vec<f64> {
+        let problem = self.problem;
+        let wide: Vec<Num> = x.iter().map(|&x| Num::of(x)).collect();
+        let mut currents_a = self.amperes(&wide);
+        if self.limits == Limits::Lower {
+            for (i, current) in currents_a.iter_mut().enumerate() {
+                let go = problem.directions(i);
+                let [low, high] = [(go.down, f64::NEG_INFINITY), (go.up, f64::INFINITY)]
+                    .map(|(open, end)| if open { end } else { 0.0 });
+                *current = current.clamp(low, high);
+            }
+            return currents_a;
+        }
+        for (i, current) in currents_a.iter_mut().enumerate() {
+            *current = current.clamp(problem.lower_a[i], problem.upper_a[i]);
+        }
+        let total: f64 = currents_a.iter().sum();
+        if let Some(most) = problem.total_max_a.filter(|&most| total > most) {
+            let lowest: f64 = problem.lower_a.iter().sum();
+            let part = (most - lowest) / (total - lowest);
+            for (current, lower) in currents_a.iter_mut().zip(problem.lower_a) {
+                *current = lower + part * (*current - lower);
+            }
+        }
+        currents_a
+    }
+
+    /// Limits that hold the least error back as much as those of [`Self::limits`] do, up to currents of twice these.
+    pub fn near(&self, currents_a: &[f64]) -> Near {
+        if self.limits == Limits::All {
+            return Near {
+                lower_a: self.problem.lower_a.to_vec(),
+                upper_a: self.problem.upper_a.to_vec(),
+                total_max_a: self.problem.total_max_a,
+            };
+        }
+        let twice = currents_a.iter().enumerate();
+        let (lower_a, upper_a) = twice
+            .map(|(i, current)| {
+                let go = self.problem.directions(i);
+                let most = 2.0 * current.abs();
+                (
+                    if go.down { -most } else { 0.0 },
+                    if go.up { most } else { 0.0 },
+                )
+            })
+            .unzip();
+        Near {
+            lower_a,
+            upper_a,
+            total_max_a: None,
+        }
     }
 
     /// The program with its bounds, before any point. Coil `live[k]` has the row `k` of its
