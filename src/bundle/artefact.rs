@@ -130,27 +130,44 @@ impl Options {
     #[must_use]
     pub fn difference(&self, now: &Self) -> Option<String> {
         let names: BTreeSet<&String> = self.0.keys().chain(now.0.keys()).collect();
-        let differing = names.into_iter().filter_map(|name| {
+        let compared = |name: &&String| !Self::NOT_COMPARED.contains(&name.as_str());
+        let mut all = Vec::new();
+        for name in names.into_iter().filter(compared) {
             let [was, is] = [self, now].map(|options| options.0.get(name).unwrap_or(&Value::Null));
-            let compared = !Self::NOT_COMPARED.contains(&name.as_str());
-            (compared && was != is).then(|| format!("{name} {}, now {}", shown(was), shown(is)))
-        });
-        let all = differing.collect::<Vec<_>>().join("; ");
-        (!all.is_empty()).then_some(all)
+            add_differences(name, was, is, &mut all);
+        }
+        (!all.is_empty()).then(|| all.join("; "))
+    }
+}
+
+/// What differs of an option, member by member.
+fn add_differences(name: &str, was: &Value, is: &Value, all: &mut Vec<String>) {
+    match (was, is) {
+        (Value::Object(was), Value::Object(is)) => {
+            let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
+            for member in names {
+                let [was, is] =
+                    [was, is].map(|members| members.get(member).unwrap_or(&Value::Null));
+                add_differences(&format!("{name}.{member}"), was, is, all);
+            }
+        }
+        _ if was != is => all.push(format!("{name} {}, now {}", shown(was), shown(is))),
+        _ => {}
     }
 }
 
 /// The value of an option in a message.
 fn shown(value: &Value) -> String {
     const LONGEST: usize = 60;
-    match value {
+    let text = match value {
         Value::Null => "not given".to_owned(),
-        value => {
-            let text = value.to_string();
-            let short = text.chars().count() <= LONGEST;
-            if short { text } else { "otherwise".to_owned() }
-        }
+        value => value.to_string(),
+    };
+    if text.chars().count() <= LONGEST {
+        return text;
     }
+    let start: String = text.chars().take(LONGEST).collect();
+    format!("{start}...")
 }
 
 /// Platform and instructions of this program: with others the last bits of results differ.
@@ -247,5 +264,20 @@ mod tests {
         assert_eq!(check_version("1.7.3"), Ok(()));
         assert!(check_version("2.0.0").unwrap_err().contains("newer"));
         assert!(check_version("0.9.0").unwrap_err().contains("older"));
+    }
+
+    #[test]
+    fn regression_options_with_members_differed_only_in_that_they_did() {
+        let of = |translate_mm: f64| {
+            let text = format!(
+                r#"{{"surface": {{"path": "a long name of a folder and a file.obj", "translate_mm": [0, 0, {translate_mm}], "unit": "mm"}}}}"#
+            );
+            serde_json::from_str::<Options>(&text).unwrap()
+        };
+        let reported = of(5.0).difference(&of(6.5));
+        assert_eq!(
+            reported.unwrap(),
+            "surface.translate_mm [0,0,5], now [0,0,6.5]"
+        );
     }
 }

@@ -588,19 +588,21 @@ fn finish<T: Real>(
         (_, criterion) => constants.of(criterion).map(evaluate),
     };
     let at = settings.at_n_per_m.map(evaluate);
-    let bound = StageAccuracy {
-        estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
-        relative_to: "lambda^2 mean(h^2)".to_owned(),
-        method: "first-order rounding bound of the QR, optimality conditions at every breakpoint"
-            .to_owned(),
+    let accuracy = accuracy_of::<T>(problem, settings, solved, &path, chosen.as_ref());
+    // Where currents are proven to be optimal at the constants, a path that is flawed elsewhere does not matter.
+    let optimal = |lambda: Option<f64>| {
+        let gap = |at: f64| evaluate(at).duality_gap_n2 / (at * rms_height_m).powi(2);
+        lambda.is_none_or(|at| gap(at) <= ROUGH)
     };
-    let by_jnd = chosen.as_ref().filter(|_| {
-        settings.criterion == Criterion::Jnd && problem.offset_n.is_none() && bound.estimate > ROUGH
-    });
-    let accuracy = by_jnd
-        .map(|chosen| proven::<T>(problem, &path, chosen, rms_height_m))
-        .filter(|proven| proven.estimate < bound.estimate)
-        .unwrap_or(bound);
+    let harmless = |accuracy: &StageAccuracy| {
+        let followed = solved.limited.complete && solved.unlimited.complete;
+        let by_proof = settings.criterion == Criterion::Jnd && accuracy.estimate <= ROUGH;
+        followed && by_proof && jnd.is_some() && optimal(jnd) && optimal(saturation)
+    };
+    let status = match status {
+        Status::Stalled if harmless(&accuracy) => Status::Solved,
+        status => status,
+    };
     Solution {
         constants,
         maxmin_points: maxmin.map_or_else(Vec::new, |maxmin| {
@@ -620,23 +622,41 @@ fn finish<T: Real>(
     }
 }
 
-/// The error of e* - e_0 at lambda_jnd as far as it is proven: the duality gap there, and all of e_0, which without an
-/// offset is no larger a part than e* of any currents at any lambda.
-fn proven<T: Real>(
+/// The error of e*: the bound on the path's, or where that is rough what is proven of e* - e_0 at lambda_jnd, the
+/// duality gap and all of e_0, which without an offset is no larger a part than e* of any currents at any lambda.
+fn accuracy_of<T: Real>(
     problem: &ForceProblem,
+    settings: &Settings,
+    solved: &Solved,
     path: &Path,
-    jnd: &OperatingPoint,
-    rms_height_m: f64,
+    chosen: Option<&OperatingPoint>,
 ) -> StageAccuracy {
-    let square = |lambda: f64| (lambda * rms_height_m).powi(2);
-    let least = NEAR_ZERO.map(|part| part * jnd.lambda_n_per_m).into_iter();
-    let least = least.map(|lambda| {
+    let relative_to = "lambda^2 mean(h^2)".to_owned();
+    let bound = StageAccuracy {
+        estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
+        relative_to: relative_to.clone(),
+        method: "first-order rounding bound of the QR, optimality conditions at every breakpoint"
+            .to_owned(),
+    };
+    let rough = bound.estimate > ROUGH || !solved.reliable();
+    let proportional = settings.criterion == Criterion::Jnd && problem.offset_n.is_none();
+    let Some(jnd) = chosen.filter(|_| rough && proportional) else {
+        return bound;
+    };
+    let square = |lambda: f64| (lambda * problem.rms_height_m()).powi(2);
+    let least = NEAR_ZERO.map(|part| {
+        let lambda = part * jnd.lambda_n_per_m;
         let check = certificate::check::<T>(problem, lambda, &path.currents_a(lambda));
         check.mean_square_n2 / square(lambda)
     });
+    let gap = jnd.duality_gap_n2 / square(jnd.lambda_n_per_m);
+    let estimate = gap + least.into_iter().fold(1.0, f64::min);
+    if estimate > bound.estimate && solved.reliable() {
+        return bound;
+    }
     StageAccuracy {
-        estimate: jnd.duality_gap_n2 / square(jnd.lambda_n_per_m) + least.fold(1.0, f64::min),
-        relative_to: "lambda^2 mean(h^2)".to_owned(),
+        estimate,
+        relative_to,
         method: "duality gap at lambda_jnd, and how small e* is at a part of it".to_owned(),
     }
 }

@@ -4,7 +4,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::iron::SceneIron;
-use super::passive_table::{Layout, Table, axial_m, symmetries_of};
+use super::passive_table::{
+    ATTEMPTS, Layout, TABLE_SHARE, Table, axial_m, symmetries_of, tabulated,
+};
 use super::{Scene, cylinder_of};
 use crate::RunError;
 
@@ -15,10 +17,6 @@ use crate::field::steel::passive::{NoPull, Region, spread};
 
 /// Share of the tolerance given to the magnet's dipoles.
 const MAGNET_SHARE: f64 = 0.1;
-/// Error that the table may add, relative to the tolerance, or to the solution's error where that is larger.
-const TABLE_SHARE: f64 = 0.3;
-/// Attempts at the table, each with ten times less error aimed at.
-const ATTEMPTS: usize = 3;
 /// Solutions held at a time: that of points, and that of a map about them.
 const HELD: usize = 2;
 /// Step of the energy's slope, relative to the height above the steel.
@@ -130,9 +128,7 @@ impl RegionPull {
         let ranges = [x_m, y_m, z_m];
         let sure = self.pull.forces_n(places_m);
         let turns = symmetries_of(scene, ranges);
-        // A table finer than what it holds only costs time.
-        let allowed = TABLE_SHARE * wanted.tolerance.max(self.relative_error);
-        let mut aim = allowed;
+        let [mut aim, allowed] = tabulated(wanted.tolerance, self.relative_error);
         let mut best: Option<(f64, Table)> = None;
         for _ in 0..ATTEMPTS {
             let layout = Layout::new(ranges, [self.top_m, axial_m(scene)], &turns, aim);

@@ -7,18 +7,15 @@ use std::f64::consts::PI;
 
 use super::Scene;
 use super::passive::{self, Pull};
-use super::passive_table::{Layout, Table, axial_m, symmetries_of};
+use super::passive_table::{
+    ATTEMPTS, Layout, TABLE_SHARE, Table, axial_m, symmetries_of, tabulated,
+};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::map::error_scale;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange;
 
-/// Error of the table beside the pull's own, relative to the largest pull at the height and to the tolerance, or to
-/// the pull's own error where that is larger.
-const TABLE_SHARE: f64 = 0.3;
-/// Attempts at the table, each with ten times less error aimed at.
-const ATTEMPTS: usize = 3;
 /// Places off the nodes at which the table is compared with the pull itself.
 const HELD_OUT: usize = 48;
 /// Places find the largest error but for this factor: over one cored coil a finer map differs somewhere by three
@@ -66,8 +63,7 @@ impl PassiveMap {
         let tolerance = passive::tolerance_of(scene, tolerance);
         let below_m = [top_m, axial_m(scene)];
         let turns = symmetries_of(scene, ranges);
-        let allowed = TABLE_SHARE * tolerance.max(pull.relative_error());
-        let mut aim = allowed;
+        let [mut aim, allowed] = tabulated(tolerance, pull.relative_error());
         let mut evaluations = 0;
         let mut best: Option<(f64, Table, Vec<f64>)> = None;
         for _ in 0..ATTEMPTS {

@@ -23,8 +23,21 @@ const NODES_AIM: f64 = 0.1;
 const MISSES: f64 = 3.0;
 /// Most nodes along one axis.
 const MOST_NODES: usize = 160;
+/// Part of the tolerance that a table may add.
+pub(super) const TABLE_SHARE: f64 = 0.3;
+/// The most that a table aims at first, and that does, however far off the pull itself is said to be: such estimates, as
+/// of cores on a plate, are far above the error.
+const MOST_ADDED: [f64; 2] = [0.015, 0.05];
+/// Attempts at a table, each with ten times less error aimed at.
+pub(super) const ATTEMPTS: usize = 3;
 /// The pull falls about as this power of the height; taken out, so that its size does not decide.
 const FALL: i32 = 4;
+
+/// The error that a table of a pull that is itself off by `own` aims at first, and the one that does: a finer table only
+/// costs time.
+pub(super) fn tabulated(tolerance: f64, own: f64) -> [f64; 2] {
+    MOST_ADDED.map(|most| (TABLE_SHARE * own).min(most).max(TABLE_SHARE * tolerance))
+}
 
 /// A map of the region to itself: x and y exchanged or not, then each mirrored or not.
 #[derive(Debug, Clone, Copy)]
@@ -444,6 +457,14 @@ mod tests {
                 ]
             })
             .collect()
+    }
+
+    /// Of nine cores on a plate the estimate is 0.4 where the pull is right to a hundredth: a table was as coarse as that.
+    #[test]
+    fn regression_a_table_was_as_coarse_as_an_estimate_far_above_the_error() {
+        assert_eq!(tabulated(1e-3, 0.43), [0.015, 0.05]);
+        assert_eq!(tabulated(1e-3, 0.01), [0.3 * 0.01; 2]);
+        assert_eq!(tabulated(0.5, 0.43), [0.3 * 0.5; 2]);
     }
 
     #[test]

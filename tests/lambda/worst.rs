@@ -1,7 +1,7 @@
 //! The worst-point form against every vertex of small problems, and on degenerate ones.
 
 use fluxform_lambda::worst::{WorstPath, WorstSolution, maxmin, worst_point};
-use fluxform_lambda::{Event, Settings, solve};
+use fluxform_lambda::{Event, Settings, Status, solve};
 
 use crate::vertices::Vertices;
 use fluxform_testing::Random;
@@ -628,20 +628,19 @@ fn turns_report_the_change_of_the_currents() {
     assert!((meets.lambda_n_per_m - 0.7 * 1.3 / 0.05).abs() < 1e-9);
 }
 
-/// Of so many coils side by side neither the path nor a vertex of the problem without limits was found, where currents
-/// are huge, and so no constants.
-#[test]
-fn regression_the_constants_of_many_coils_that_reverse_were_not_found() {
+/// Coils that reverse, close to each other, and points above them.
+fn close_coils_that_reverse(side: usize, points_apart_m: f64) -> Case {
+    let count = side * side;
     let mut random = Random::new(1301);
     let place = |k: usize, side: usize, pitch: f64| {
         let at = |i: usize| pitch * (i as f64 - 0.5 * (side - 1) as f64);
         [at(k % side), at(k / side)]
     };
-    let coils: Vec<[f64; 2]> = (0..169)
-        .map(|k| place(k, 13, 0.015).map(|x| x + random.between(-4.5e-4, 4.5e-4)))
+    let coils: Vec<[f64; 2]> = (0..count)
+        .map(|k| place(k, side, 0.015).map(|x| x + random.between(-4.5e-4, 4.5e-4)))
         .collect();
     let (mut forces, mut heights) = (Vec::new(), Vec::new());
-    for [x, y] in (0..169).map(|k| place(k, 13, 0.0075)) {
+    for [x, y] in (0..169).map(|k| place(k, 13, points_apart_m)) {
         let height: f64 = 0.025 + 0.1 * x + 0.05 * y + 0.005 * (50.0 * x).sin() * (40.0 * y).cos();
         heights.push(height);
         for [u, v] in &coils {
@@ -651,15 +650,21 @@ fn regression_the_constants_of_many_coils_that_reverse_were_not_found() {
             forces.push(1e-8 * z * (2.0 * z * z - 3.0 * square) / (square + z * z).powf(3.5));
         }
     }
-    let case = Case {
+    Case {
         forces,
         heights,
         offset: None,
-        lower: (0..169).map(|_| -random.between(0.0, 1.0)).collect(),
-        upper: (0..169).map(|_| random.between(0.8, 2.0)).collect(),
+        lower: (0..count).map(|_| -random.between(0.0, 1.0)).collect(),
+        upper: (0..count).map(|_| random.between(0.8, 2.0)).collect(),
         total: Some(118.0),
-        ohm: vec![6.0; 169],
-    };
+        ohm: vec![6.0; count],
+    }
+}
+
+/// Neither the path nor a vertex of the problem without limits was found, where currents are huge, and so no constants.
+#[test]
+fn regression_the_constants_of_many_coils_that_reverse_were_not_found() {
+    let case = close_coils_that_reverse(13, 0.0075);
     let solution = solved(&case);
     assert!(solution.complete && solution.path.is_none(), "{solution:?}");
     let jnd = solution.lambda_jnd_n_per_m.expect("binds");
@@ -670,4 +675,16 @@ fn regression_the_constants_of_many_coils_that_reverse_were_not_found() {
     let felt = floor + Settings::default().jnd_weight;
     let off = point.worst_error_n / requested - felt;
     assert!(off.abs() < 1e-8 && floor < 1e-6, "{floor} {off}");
+}
+
+/// The error of e* that was stated is that of the first breakpoints, where the same currents bring next to no force: it was
+/// above e* itself. Nor does a flaw of the path there leave lambda_jnd unknown.
+#[test]
+fn regression_the_error_at_lambda_jnd_was_that_of_currents_without_limits() {
+    let case = close_coils_that_reverse(14, 0.005);
+    let solution = solve(&case.problem(), &Settings::default()).expect("well formed");
+    assert_eq!(solution.status, Status::Solved);
+    let accuracy = &solution.accuracy;
+    assert!(accuracy.estimate < 1e-12, "{accuracy:?}");
+    assert!(accuracy.method.starts_with("duality gap"), "{accuracy:?}");
 }

@@ -1,4 +1,5 @@
-//! The worst-point force constants without the path: programs at one force constant each.
+//! The worst-point force constants without the path: programs at one force constant each, solved at vertices or by the
+//! interior-point method.
 //!
 //! t* is convex in lambda, and the multipliers at any lambda give a line below all of it. So
 //! from a lambda above every limit the lines lead down to where t* leaves the errors that are
