@@ -589,18 +589,10 @@ fn finish<T: Real>(
     };
     let at = settings.at_n_per_m.map(evaluate);
     let accuracy = accuracy_of::<T>(problem, settings, solved, &path, chosen.as_ref());
-    // Where currents are proven to be optimal at the constants, a path that is flawed elsewhere does not matter.
-    let optimal = |lambda: Option<f64>| {
-        let gap = |at: f64| evaluate(at).duality_gap_n2 / (at * rms_height_m).powi(2);
-        lambda.is_none_or(|at| gap(at) <= ROUGH)
-    };
-    let harmless = |accuracy: &StageAccuracy| {
-        let followed = solved.limited.complete && solved.unlimited.complete;
-        let by_proof = settings.criterion == Criterion::Jnd && accuracy.estimate <= ROUGH;
-        followed && by_proof && jnd.is_some() && optimal(jnd) && optimal(saturation)
-    };
+    let gap = |at: f64| evaluate(at).duality_gap_n2 / (at * rms_height_m).powi(2);
+    let is_harmless = || harmless(settings, solved, &accuracy, [jnd, saturation], gap);
     let status = match status {
-        Status::Stalled if harmless(&accuracy) => Status::Solved,
+        Status::Stalled if is_harmless() => Status::Solved,
         status => status,
     };
     Solution {
@@ -620,6 +612,20 @@ fn finish<T: Real>(
         accuracy,
         path,
     }
+}
+
+/// Whether a flaw of the path does not matter: `gap` proves the currents at lambda_jnd and saturation to be optimal.
+fn harmless(
+    settings: &Settings,
+    solved: &Solved,
+    accuracy: &StageAccuracy,
+    [jnd, saturation]: [Option<f64>; 2],
+    gap: impl Fn(f64) -> f64,
+) -> bool {
+    let optimal = |lambda: Option<f64>| lambda.is_none_or(|at| gap(at) <= ROUGH);
+    let followed = solved.limited.complete && solved.unlimited.complete;
+    let by_proof = settings.criterion == Criterion::Jnd && accuracy.estimate <= ROUGH;
+    followed && by_proof && jnd.is_some() && optimal(jnd) && optimal(saturation)
 }
 
 /// The error of e*: the bound on the path's, or where that is rough what is proven of e* - e_0 at lambda_jnd, the

@@ -38,7 +38,7 @@ const IDLE_STEPS: usize = 10;
 const PART: f64 = 0.995;
 /// Added to the scaled equations' diagonal of ones.
 const REGULAR: f64 = 4e-15;
-/// The same where rounding has made them indefinite.
+/// The same where rounding has made the equations indefinite.
 const MORE_REGULAR: f64 = 1e-12;
 /// Shares of the proof below this are left out.
 const NO_SHARE: f64 = 1e-12;
@@ -93,7 +93,7 @@ struct Unknowns {
     rows: Vec<f64>,
 }
 
-/// Unknowns that make the forces of some currents' independent of each other.
+/// Unknowns that make the forces of some currents independent of each other.
 struct Turned {
     free: Vec<usize>,
     /// The scaled currents of each, column by column.
@@ -171,7 +171,7 @@ impl<'s, 'a> Interior<'s, 'a> {
         self.currents.rows.extend(rows);
     }
 
-    /// Unknowns in place of the currents that have no limit near: `v = R x` of those.
+    /// Takes `v = R x` of these currents, which no limit holds, as unknowns.
     fn turn(&mut self, free: Vec<usize>) {
         if self
             .turned

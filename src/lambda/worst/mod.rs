@@ -18,8 +18,8 @@
 //! or stands still at turns where symmetry lets many points decide at once, the constants alone are
 //! solved for, and the currents at any one lambda, to within the gap of their proof.
 //!
-//! Where several currents are equally good, a vertex is returned: of coils that cannot pull, the one
-//! with the least sum of currents.
+//! Where several currents are equally good, a vertex is returned, as far as doubles lead to one: of coils that cannot
+//! pull, that with the least sum of currents.
 
 mod blocks;
 mod constants;

@@ -50,7 +50,7 @@ pub(super) struct Scaled<'a> {
     pub live: Vec<usize>,
 }
 
-/// Limits of a problem.
+/// Limits of a problem, in place of its own.
 pub(super) struct Near {
     lower_a: Vec<f64>,
     upper_a: Vec<f64>,
@@ -236,7 +236,8 @@ impl<'a> Scaled<'a> {
         self.live.iter().map(range).collect()
     }
 
-    /// Scaled currents in the middle of their limits; half as much below zero's side of them as keeps their sum too.
+    /// Scaled currents in the middle of their limits, nearer to the lower ones where their sum has little room; without
+    /// the drivers' size one ampere where currents flow one way, else zero.
     pub fn middle(&self) -> Vec<f64> {
         let problem = self.problem;
         let middle = |lower: f64, upper: f64, part: f64| lower + part * (upper - lower);
