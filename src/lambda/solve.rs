@@ -545,11 +545,8 @@ fn finish<T: Real>(
     let (linear, jnd) = first_and_jnd(settings, solved, &comparison, rank);
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
     let status = status(solved, &comparison);
-    let lowest = problem
-        .height_m
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min);
+    let heights = problem.height_m.iter();
+    let lowest = heights.fold(f64::INFINITY, |least, h| least.min(*h));
     let rms_height_m = comparison.mean_square.sqrt().to_f64() * solved.reduced.height_unit_m();
     let agrees = Cell::new(true);
     let given = |lambda: f64, currents_a: Vec<f64>, error_n2: Option<f64>| {

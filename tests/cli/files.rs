@@ -422,7 +422,7 @@ fn what_other_options_made_is_replaced_with_force_alone() {
         (
             &stl,
             &["--scale", "0.7"],
-            "surface otherwise, now otherwise",
+            "surface.scale [1.0,1.0,1.0], now [0.7,0.7,0.7]",
             "s.csv",
         ),
         (
