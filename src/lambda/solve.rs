@@ -643,7 +643,7 @@ fn accuracy_of<T: Real>(
     };
     let rough = bound.estimate > ROUGH || !solved.reliable();
     let proportional = settings.criterion == Criterion::Jnd && problem.offset_n.is_none();
-    let Some(jnd) = chosen.filter(|_| rough && proportional) else {
+    let Some(jnd) = chosen.filter(|at| rough && proportional && at.lambda_n_per_m > 0.0) else {
         return bound;
     };
     let square = |lambda: f64| (lambda * problem.rms_height_m()).powi(2);

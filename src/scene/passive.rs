@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::iron::SceneIron;
 use super::passive_iron::{RegionPull, Wanted, magnet_of, too_close};
-use super::passive_table::{region, scattered_z_n};
+use super::passive_table::{TABLE_SHARE, region, scattered_z_n};
 use super::prepared_field::rounded_down;
 use super::{Scene, coupled};
 use crate::RunError;
@@ -25,8 +25,6 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 const LEFT_OUT_TOLERANCE: f64 = 1e-2;
 /// The same of a plate and other bodies, whose finer panels take a minute.
 const IRON_LEFT_OUT: f64 = 0.05;
-/// Of a tolerance where the pull is left out what tabulating it may add.
-const TABLE_SHARE: f64 = 0.3;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;

@@ -688,3 +688,25 @@ fn regression_the_error_at_lambda_jnd_was_that_of_currents_without_limits() {
     assert!(accuracy.estimate < 1e-12, "{accuracy:?}");
     assert!(accuracy.method.starts_with("duality gap"), "{accuracy:?}");
 }
+
+/// Coils too many for a path, without any height, with and without an offset.
+#[test]
+fn no_heights_leave_no_constants_and_a_finite_error() {
+    for offset in [None, Some(1e-3)] {
+        for reverse in [false, true] {
+            let mut case = close_coils_that_reverse(13, 0.0075);
+            case.heights.fill(0.0);
+            case.offset = offset.map(|offset| vec![offset; case.heights.len()]);
+            if !reverse {
+                case.lower.fill(0.0);
+            }
+            let solution = solved(&case);
+            assert_eq!(solution.lambda_jnd_n_per_m, None, "{offset:?} {reverse}");
+            assert!(
+                solution.accuracy.estimate.is_finite(),
+                "{:?}",
+                solution.accuracy
+            );
+        }
+    }
+}

@@ -486,3 +486,18 @@ fn points_line(points: &PointsReport, file: &LambdaFile) -> String {
         describe::heights(points.min_height_m, points.max_height_m)
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{WorstPointFile, worst_point};
+
+    #[test]
+    fn constants_that_are_not_known_differ_from_limits_that_never_bind() {
+        let line = |unknown: bool| {
+            let file = serde_json::json!({ "path": [], "constants_unknown": unknown });
+            worst_point(&serde_json::from_value::<WorstPointFile>(file).unwrap())
+        };
+        assert!(line(true).ends_with("linear not known, jnd not known"));
+        assert!(line(false).ends_with("linear none, jnd none"));
+    }
+}

@@ -94,11 +94,13 @@ fn constants(
         doubt: 0.0,
     };
     if offset_n == 0.0 {
+        // No currents do at lambda = 0.
         let line = errors.free_line(1.0)?;
-        errors.doubt = line.gap / errors.size(1.0);
+        errors.doubt_at(line.gap, 1.0);
         errors.proportional = Some(line);
+    } else {
+        errors.without = errors.limited_line(0.0)?.value.max(0.0);
     }
-    errors.without = errors.limited_line(0.0)?.value.max(0.0);
     let linear = errors.largest_within(0.0)?;
     let jnd = match linear {
         Some(_) if weight > 0.0 => errors.largest_within(weight)?,
@@ -176,6 +178,14 @@ impl Errors<'_, '_> {
         self.top * lambda + self.without
     }
 
+    /// Takes the gap at `lambda` into the doubt; without heights there is no force to be a share of.
+    fn doubt_at(&mut self, gap: f64, lambda: f64) {
+        let size = self.size(lambda);
+        if size > 0.0 {
+            self.doubt = self.doubt.max(gap / size);
+        }
+    }
+
     /// What may hide `t* - t_0`.
     fn visible(&self, [t, free]: [Line; 2]) -> f64 {
         (VISIBLE * self.size(t.lambda)).max(VISIBLE_GAPS * (t.gap + free.gap))
@@ -226,8 +236,7 @@ impl Errors<'_, '_> {
             let next = if at == FAR { NEAR * next } else { next };
             high = [self.limited_line(next)?, self.free_line(next)?];
         }
-        let gap = high[0].gap + high[1].gap;
-        self.doubt = self.doubt.max(gap / self.size(high[0].lambda));
+        self.doubt_at(high[0].gap + high[1].gap, high[0].lambda);
         Some(Some(high[0].lambda))
     }
 }
@@ -265,7 +274,7 @@ impl Optima<'_, '_> {
                 (line, MOST_DOUBT[1] * centre.size)
             }
         };
-        (line.gap <= most || lambda == 0.0).then_some(line)
+        (line.gap <= most).then_some(line)
     }
 }
 
