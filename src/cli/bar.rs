@@ -15,6 +15,14 @@ const DELAY: Duration = Duration::from_millis(500);
 /// Time between two drawings.
 const REFRESH: Duration = Duration::from_millis(100);
 
+/// Held while a bar is drawn or cleared.
+static DRAWING: Mutex<()> = Mutex::new(());
+
+/// No bar is drawn or cleared while this is held: what is printed meanwhile stays.
+pub fn hold() -> MutexGuard<'static, ()> {
+    DRAWING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Draws the current stage once it has lasted half a second, and measures every stage.
 #[derive(Debug)]
 pub struct Bar {
@@ -117,6 +125,7 @@ impl State {
         let Some(stage) = self.stages.last().filter(|s| s.began.elapsed() >= DELAY) else {
             return;
         };
+        let _drawing = hold();
         let (name, elapsed) = (&stage.name, stage.began.elapsed());
         let message = if stop_requested() {
             format!("{name} (stopping)")
@@ -148,6 +157,7 @@ impl State {
 
     fn clear(&mut self) {
         if let Some(bar) = self.drawn.take() {
+            let _drawing = hold();
             bar.finish_and_clear();
         }
     }
@@ -247,6 +257,25 @@ mod tests {
         assert_eq!(names, ["inner", "outer"]);
         assert!(seconds[0].1 <= seconds[1].1);
         assert!(bar.take_seconds().is_empty());
+    }
+
+    /// A bar that is cleared later would erase what was printed.
+    #[test]
+    fn regression_a_held_bar_is_not_cleared() {
+        let mut state = State {
+            drawn: Some(ProgressBar::hidden()),
+            ..State::default()
+        };
+        let held = hold();
+        let (cleared, is_cleared) = std::sync::mpsc::channel();
+        let painter = thread::spawn(move || {
+            state.clear();
+            cleared.send(()).unwrap();
+        });
+        assert!(is_cleared.recv_timeout(REFRESH).is_err());
+        drop(held);
+        painter.join().unwrap();
+        assert!(is_cleared.recv().is_ok());
     }
 
     #[test]

@@ -16,6 +16,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::args::Common;
+use super::bar;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::printer::Printer;
@@ -95,6 +96,7 @@ fn guard(common: &Common) {
             if ENDED.swap(true, Ordering::SeqCst) {
                 return;
             }
+            let _held = bar::hold();
             let printer = Printer::new(common);
             printer.erase_line();
             printer.warning(NO_POLL);
