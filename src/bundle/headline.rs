@@ -92,16 +92,16 @@ impl BudgetName {
                 "take 1.4 times as many points along x and y, or let --refine add heights"
             }
             Self::Forces | Self::MapNodes => "halve --tolerance",
-            Self::Interpolation if error > RESOLVED => {
+            Self::Interpolation | Self::PullMap if error > RESOLVED => {
                 "take twice as many nodes along each axis of [workspace], of which so few do not resolve the field"
             }
-            Self::Interpolation => "take 1.2 times as many nodes along each axis of [workspace]",
+            Self::Interpolation | Self::PullMap => {
+                "take 1.2 times as many nodes along each axis of [workspace]"
+            }
             Self::Saturation => {
                 "set supply.current_max_a near the currents used, or lower them below the steel's knee"
             }
-            Self::Pull | Self::PullMap => {
-                "the pull's own tolerance is fixed; its share falls with a larger lambda"
-            }
+            Self::Pull => "the pull's own tolerance is fixed; its share falls with a larger lambda",
             Self::Solution => "nothing: rounding decides",
         }
     }
@@ -489,7 +489,12 @@ mod tests {
         assert!(
             headline
                 .to_halve
+                .as_ref()
                 .is_some_and(|what| what.contains("[workspace]"))
         );
+        // The map of the pull of unpowered cores was said to be fixed.
+        headline.add([part(BudgetName::PullMap, 3.0)]);
+        let halved = headline.to_halve.expect("a part");
+        assert!(halved.contains("twice as many nodes"), "{halved}");
     }
 }

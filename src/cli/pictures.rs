@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use super::documents::DesignDocument;
 use super::failure::Failure;
 use super::printer::{Printer, Stream};
+use super::start::is_written;
 use super::values::FileArgument;
 use crate::RunError;
 use crate::bundle::artefact::Input;
@@ -231,11 +232,7 @@ impl<'a> Picture<'a> {
 
     /// Says that its file is in place; of a stream that was said as it was written to.
     pub fn is_written(&self, printer: &Printer) {
-        if let FileArgument::Path(path) = self.file
-            && !atomic::is_stream(path)
-        {
-            printer.notice(&format!("written: {}", shown_path(path)));
-        }
+        is_written(Some(self.file), printer);
     }
 
     /// By the file's ending; pages, which have their own, are texts as SVG is.

@@ -9,7 +9,8 @@ use super::interrupt;
 use super::printer::{Printer, Stream};
 use super::values::{FileArgument, TOLERANCE};
 use crate::RunError;
-use crate::bundle::atomic::{Overwrite, write};
+use crate::bundle::atomic::{self, Overwrite, write};
+use crate::design::message_text::shown_path;
 
 /// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
 pub fn begin(printer: &Printer) -> Bar {
@@ -52,6 +53,15 @@ pub fn write_to(
             write(path, overwrite, content).map_err(RunError::from)?;
             Ok(Stream::Output)
         }
+    }
+}
+
+/// Says that a file is in place; of a stream that was said as it was written to.
+pub fn is_written(file: Option<&FileArgument>, printer: &Printer) {
+    if let Some(FileArgument::Path(path)) = file
+        && !atomic::is_stream(path)
+    {
+        printer.notice(&format!("written: {}", shown_path(path)));
     }
 }
 

@@ -263,6 +263,7 @@ mod tests {
             bounds: &free,
             start: None,
             most_error: None,
+            most_changes: None,
         };
         let mut path = follower.path(None, &numbers(&[0.0, 1.0]));
         // Half a thousand amperes a unit, and as much the other way.

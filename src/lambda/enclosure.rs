@@ -26,9 +26,9 @@
 use fluxform_numerics::real::Real;
 
 use super::certificate::best_within_limits;
+use super::followed::{Extent, solve_paths};
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::qr_reduction::{largest_entries, times_power};
-use super::solve::{Extent, solve_paths};
 
 /// The currents that decide lambda_jnd.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,6 +5,8 @@
 //! coils over 9 points. So the path goes straight to currents just below lambda_linear, which the linear
 //! program of the worst point names: the least largest error is zero up to the same lambda.
 
+use std::cell::OnceCell;
+
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
@@ -23,6 +25,10 @@ const ROOM: f64 = 1e-9;
 /// Currents that differ from a limit by a smaller share of their range are at it.
 const AT_LIMIT: f64 = 1e-12;
 
+/// A force constant just below lambda_linear, N/m, and currents, A, that give its force exactly, once they are
+/// solved for.
+pub(super) type NearLinear = OnceCell<Option<(f64, Vec<f64>)>>;
+
 /// A start near lambda_linear; `None` where the forces requested are not within the limits' signs, or rounding
 /// keeps the currents from being exact. `residual_rate` is that without the drivers' size.
 pub(super) fn exact_start(
@@ -30,6 +36,7 @@ pub(super) fn exact_start(
     reduced: &Reduced,
     (model, bounds): (&Model, &Bounds),
     residual_rate: &[Num],
+    near_linear: &NearLinear,
 ) -> Option<ExactStart> {
     let heights = reduced.heights();
     let few = problem.points() < problem.coils() && problem.offset_n.is_none();
@@ -41,8 +48,9 @@ pub(super) fn exact_start(
         total_max_a: problem.total_max_a.map(|total| total * (1.0 - ROOM)),
         ..*problem
     };
-    let (lambda_n_per_m, currents_a) = worst::without_error(&narrowed, 1.0 - ROOM)?;
-    let lambda = Num::of(times_power(lambda_n_per_m, -reduced.lambda_scale));
+    let near_linear = near_linear.get_or_init(|| worst::without_error(&narrowed, 1.0 - ROOM));
+    let (lambda_n_per_m, currents_a) = near_linear.as_ref()?;
+    let lambda = Num::of(times_power(*lambda_n_per_m, -reduced.lambda_scale));
     if lambda <= Num::ZERO {
         return None;
     }
@@ -92,8 +100,8 @@ fn is_nothing(residual: &[Num], requested: &[Num]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::followed::{Extent, solve_paths};
     use crate::qr_reduction::largest_entries;
-    use crate::solve::{Extent, solve_paths};
 
     /// Dipoles 10 mm apart under 3 x 3 points: from limit to limit the path up to lambda_linear has hundreds of pieces.
     #[test]

@@ -138,6 +138,8 @@ pub(super) struct Follower<'a> {
     /// Square of the residual over `lambda^2`, beyond which the path is not needed: it comes to rest at the next
     /// breakpoint. Without an offset this share never falls.
     pub most_error: Option<Num>,
+    /// Changes of the basis after which the path is given up.
+    pub most_changes: Option<usize>,
 }
 
 impl Follower<'_> {
@@ -237,7 +239,8 @@ impl Follower<'_> {
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
             fluxform_base::progress::poll();
-            let Some((piece, event)) = self.leave(&state, basis) else {
+            let given_up = self.most_changes.is_some_and(|most| basis.changes > most);
+            let Some((piece, event)) = self.leave(&state, basis).filter(|_| !given_up) else {
                 break;
             };
             let lambda = event.map(|step| piece.start + step);
@@ -601,6 +604,7 @@ mod tests {
                 bounds: &self.bounds,
                 start: None,
                 most_error: None,
+                most_changes: None,
             };
             follower.path(self.offset.as_deref(), &self.slope)
         }

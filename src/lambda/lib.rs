@@ -58,6 +58,7 @@ mod criteria;
 pub mod enclosure;
 mod exact_start;
 pub mod feedback;
+mod followed;
 mod given;
 mod homotopy;
 pub mod limit;
@@ -81,10 +82,11 @@ pub mod worst;
 
 pub use allocation::{Allocation, Allocator, AllocatorError, Reach};
 pub use fluxform_base::force_constant::{Criterion, ForceConstants, Jnd, NamedConstant};
+pub use followed::Precision;
 pub use given::GivenForce;
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
-pub use solve::{OperatingPoint, Precision, Solution, Status, constant, relative_error, solve};
+pub use solve::{OperatingPoint, Solution, Status, constant, relative_error, solve};
 pub use vector_allocation::{
     MET as VECTOR_MET, SIDEWAYS_WEIGHT, VectorAllocation, VectorAllocator,
 };

@@ -233,23 +233,32 @@ impl Path {
     /// least power.
     #[must_use]
     pub fn currents_a(&self, lambda_n_per_m: f64) -> Vec<f64> {
-        let (index, step) = self.locate(lambda_n_per_m);
-        let coils = self.limits.upper_a.len();
-        let within = |i: usize, current: f64| {
-            current.clamp(self.limits.lower_a[i], self.limits.upper_a[i]) + 0.0
-        };
         if let Some(a) = &self.ambiguous {
+            let (index, _) = self.locate(lambda_n_per_m);
             let lambda = Num::of(times_power(lambda_n_per_m, -a.lambda_scale));
             let norm = lambda * a.heights;
             let x =
                 power::least_power(&a.model, &a.bounds, &a.cost, &a.pieces[index], lambda, norm);
-            return (0..coils)
-                .map(|i| within(i, times_power(x[i].to_f64(), -self.current_scale[i])))
-                .collect();
+            let scales = self.current_scale.iter();
+            let currents = x.iter().zip(scales);
+            return self.within(currents.map(|(x, scale)| times_power(x.to_f64(), -scale)));
         }
+        self.fitting_a(lambda_n_per_m)
+    }
+
+    /// Best currents, A, whatever power they take.
+    pub(super) fn fitting_a(&self, lambda_n_per_m: f64) -> Vec<f64> {
+        let (index, step) = self.locate(lambda_n_per_m);
         let piece = &self.pieces[index];
-        (0..coils)
-            .map(|i| within(i, piece.currents[i] + step * piece.rates[i]))
+        let currents = piece.currents.iter().zip(&piece.rates);
+        self.within(currents.map(|(current, rate)| current + step * rate))
+    }
+
+    fn within(&self, currents: impl Iterator<Item = f64>) -> Vec<f64> {
+        let limits = self.limits.lower_a.iter().zip(&self.limits.upper_a);
+        let limited = currents.zip(limits);
+        limited
+            .map(|(current, (lower, upper))| current.clamp(*lower, *upper) + 0.0)
             .collect()
     }
 

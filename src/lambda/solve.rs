@@ -9,32 +9,14 @@ use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 use super::certificate;
-use super::criteria::{Comparison, VISIBLE};
-use super::exact_start::exact_start;
-use super::homotopy::{Bounds, Follower, Piece, Trace};
-use super::model::Model;
+use super::criteria::Comparison;
+use super::followed::{Extent, Precision, Solved, solve_paths};
+use super::homotopy::{Piece, Trace};
 use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
-use super::qr_reduction::{Reduced, counted_coils, largest_entries, times_power};
-use super::rest;
+use super::qr_reduction::{largest_entries, times_power};
 use super::worst;
 
-/// Above this condition number of the coils' columns doubles do not decide.
-const PLAIN_CONDITION: f64 = 1e3;
-/// Up to this condition number, found in doubles, no column depends on others within rounding.
-const INDEPENDENT: f64 = 1e10;
-/// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
-const PLAIN_ERROR: f64 = 2e-14;
-/// Share of a column outside the span of others that is weak: currents within the limits do little with it. Where the
-/// best error is of the order of the least share, multipliers are of its square and rounding over it: this is above the
-/// third root of rounding.
-const WEAK: f64 = 1e-8;
-/// The same for lambda_jnd alone.
-const WEAK_FOR_JND: f64 = 1e-6;
-/// Change of e* at lambda_jnd, relative to the excess there, that leaves lambda_jnd alone.
-const SMALL: f64 = 1e-6;
-/// Change of e*, relative to lambda^2 mean(h^2), up to which dependences are taken as exact.
-const SHOWN: f64 = 1e-11;
 /// Share of lambda^2 mean(h^2) by which the currents' error may be above e*, or the path is wrong.
 const AGREES: f64 = 1e-8;
 /// A bound on rounding, relative to `lambda^2 mean(h^2)`, above which what is proven at the chosen force constant says
@@ -42,9 +24,6 @@ const AGREES: f64 = 1e-8;
 const ROUGH: f64 = 1e-9;
 /// Parts of the chosen force constant at which e* shows how small e_0 is.
 const NEAR_ZERO: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
-/// Largest relative violation of optimality that is taken for rounding: its square counts.
-const FLAW: f64 = 1e-8;
-
 /// How far a solution may be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
@@ -57,15 +36,6 @@ pub enum Status {
     /// The path could not be followed to its end, so that numbers beyond its last breakpoint are not the
     /// minimum, or the error of its currents is not the path's.
     Stalled,
-}
-
-/// The arithmetic in which the points were reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    /// 53 bits.
-    Double,
-    /// About 105 bits.
-    DoubleDouble,
 }
 
 /// Currents at one force constant and what they are worth.
@@ -106,184 +76,6 @@ pub struct Solution {
     pub precision: Precision,
     /// Estimated error of e*.
     pub accuracy: StageAccuracy,
-}
-
-/// How much of the path is needed.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Extent {
-    /// All of it.
-    Whole,
-    /// Up to lambda_jnd of this weight above zero, if there is no offset: beyond, the path comes to rest.
-    ToJnd(f64),
-}
-
-impl Extent {
-    /// What the chosen constant needs.
-    pub fn of(settings: &Settings) -> Self {
-        match settings.criterion {
-            Criterion::Jnd if settings.jnd_weight > 0.0 => Self::ToJnd(settings.jnd_weight),
-            _ => Self::Whole,
-        }
-    }
-
-    /// The share of `lambda^2` beyond which e* is not needed.
-    fn most_error(self, unlimited: &Piece, heights: &[Num]) -> Option<Num> {
-        let square = |v: &[Num]| Num::dot(v, v);
-        match self {
-            Self::Whole => None,
-            Self::ToJnd(weight) => {
-                let share = Num::of(weight) * Num::of(weight);
-                Some(square(&unlimited.residual_rate) + share * square(heights))
-            }
-        }
-    }
-}
-
-/// Both paths of one reduced problem.
-pub(super) struct Solved {
-    pub reduced: Reduced,
-    model: Model,
-    bounds: Bounds,
-    /// The bounds of `unlimited`.
-    free_bounds: Bounds,
-    pub limited: Trace,
-    pub unlimited: Trace,
-    /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
-    error: f64,
-    flaw: f64,
-    /// Share of `lambda^2 mean(h^2)` up to which e* may be off since weak parts are left out.
-    doubt: f64,
-}
-
-/// The path without the drivers' size.
-struct Unlimited {
-    bounds: Bounds,
-    trace: Trace,
-    /// Rounding in e* on it, relative to `lambda^2 mean(h^2)`.
-    error: f64,
-}
-
-impl Unlimited {
-    fn new(problem: &ForceProblem, reduced: &Reduced) -> Self {
-        let (model, bounds) = reduced.unlimited(problem);
-        let follower = Follower {
-            model: &model,
-            bounds: &bounds,
-            start: None,
-            most_error: None,
-        };
-        let trace = follower.path(reduced.offset().as_deref(), reduced.heights());
-        let error = rounding(&model, &trace, reduced.heights());
-        Self {
-            bounds,
-            trace,
-            error,
-        }
-    }
-}
-
-impl Solved {
-    fn new(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> Self {
-        let unlimited = Unlimited::new(problem, &reduced);
-        Self::with(problem, extent, reduced, unlimited)
-    }
-
-    fn with(problem: &ForceProblem, extent: Extent, reduced: Reduced, free: Unlimited) -> Self {
-        let offset = reduced.offset();
-        let heights = reduced.heights();
-        let (model, bounds) = reduced.limited(problem);
-        let unlimited = &free.trace.pieces[0];
-        let most_error = extent.most_error(unlimited, heights);
-        let rate = &unlimited.residual_rate;
-        let follower = Follower {
-            model: &model,
-            bounds: &bounds,
-            start: exact_start(problem, &reduced, (&model, &bounds), rate),
-            most_error: most_error.filter(|_| offset.is_none()),
-        };
-        let mut limited = follower.path(offset.as_deref(), heights);
-        let mut error = rounding(&model, &limited, heights).max(free.error);
-        if limited.complete && rest::bring_to_rest(&mut limited, offset.as_deref(), heights) {
-            error += rest::COST;
-        }
-        Self {
-            model,
-            bounds,
-            free_bounds: free.bounds,
-            error,
-            flaw: limited.flaw.max(free.trace.flaw),
-            doubt: 0.0,
-            limited,
-            unlimited: free.trace,
-            reduced,
-        }
-    }
-
-    /// e* and e_0 side by side.
-    pub fn comparison(&self) -> Comparison<'_> {
-        let heights = self.reduced.heights();
-        Comparison {
-            limited: &self.limited,
-            unlimited: &self.unlimited,
-            mean_square: Num::dot(heights, heights),
-            visible: VISIBLE.max(self.doubt),
-        }
-    }
-
-    /// The limited path in SI units.
-    pub fn path(&self, problem: &ForceProblem) -> Path {
-        let Self {
-            reduced,
-            bounds,
-            limited,
-            ..
-        } = self;
-        Path::new(problem, reduced, bounds, limited, self.doubt)
-    }
-
-    pub fn reliable(&self) -> bool {
-        self.limited.complete && self.unlimited.complete && self.flaw <= FLAW
-    }
-
-    /// Bound on the change of e*, relative to `lambda^2 mean(h^2)`, where the fit of any currents within the limits
-    /// moves by no more than `moved`, in its unit.
-    fn change(&self, moved: Num) -> f64 {
-        let heights = self.reduced.heights();
-        let height = Num::dot(heights, heights).sqrt();
-        let change = |piece: &Piece| {
-            let error = Num::dot(&piece.residual, &piece.residual).sqrt();
-            let requested = piece.start * height;
-            ((error + error + moved) * moved / (requested * requested)).to_f64()
-        };
-        let pieces = self.limited.pieces.iter();
-        let changes = pieces.filter(|piece| piece.start > Num::ZERO).map(change);
-        changes.fold(0.0, f64::max)
-    }
-}
-
-/// First-order effect of the columns' rounding on e*, at the breakpoints: the residual times
-/// the sum of all columns' contributions, and a margin for the sums over points.
-fn rounding(model: &Model, trace: &Trace, heights: &[Num]) -> f64 {
-    let size = Num::dot(heights, heights).sqrt();
-    let mut worst = 1.0_f64;
-    for piece in &trace.pieces {
-        // On the first piece everything grows with lambda: its rates will do.
-        let (x, residual, requested) = if piece.start > Num::ZERO {
-            (&piece.x, &piece.residual, piece.start * size)
-        } else {
-            (&piece.x_rate, &piece.residual_rate, size)
-        };
-        if requested > Num::ZERO {
-            let moved = x
-                .iter()
-                .zip(&model.norm)
-                .fold(Num::ZERO, |s, (&x, &n)| s + x.abs() * n);
-            let share =
-                Num::dot(residual, residual).sqrt() / requested * (moved / requested + Num::ONE);
-            worst = worst.max(share.to_f64());
-        }
-    }
-    20.0 * model.epsilon * worst
 }
 
 /// Solves eq. 9 and 10: the exact path of e*(lambda), the force constants on it, and the
@@ -366,131 +158,6 @@ pub fn relative_error(
     Ok(Some(path.error_n2(lambda_n_per_m).sqrt() / requested_n))
 }
 
-/// Both paths, the number of independent columns, and the arithmetic of their reduction.
-pub(super) fn solve_paths(
-    problem: &ForceProblem,
-    largest: &[f64],
-    extent: Extent,
-) -> (Solved, usize, Precision) {
-    let counted = counted_coils(problem, largest);
-    let mut condition = None;
-    if problem.points() >= counted.len() && counted.iter().all(|&coil| largest[coil] > 0.0) {
-        let reduced = Reduced::new::<f64>(problem, largest);
-        let plain = reduced.condition();
-        condition = Some(plain).filter(|&condition| condition <= INDEPENDENT);
-        if plain <= PLAIN_CONDITION
-            && let Some(solved) = solve_plainly(problem, extent, reduced)
-        {
-            return (solved, counted.len(), Precision::Double);
-        }
-    }
-    let reduced = condition
-        .and_then(|condition| Reduced::by_products(problem, largest, condition))
-        .unwrap_or_else(|| Reduced::new::<Num>(problem, largest));
-    let (solved, rank) = match condition {
-        Some(_) => (Solved::new(problem, extent, reduced), counted.len()),
-        None => solve_dependent(problem, extent, reduced),
-    };
-    (solved, rank, Precision::DoubleDouble)
-}
-
-/// From the reduction in doubles; `None` where that is not enough.
-fn solve_plainly(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> Option<Solved> {
-    let free = Unlimited::new(problem, &reduced);
-    if free.error > PLAIN_ERROR {
-        return None;
-    }
-    let solved = Solved::with(problem, extent, reduced, free);
-    (solved.reliable() && solved.error <= PLAIN_ERROR).then_some(solved)
-}
-
-/// Where columns may depend on each other: dependences that lie within the rounding of the forces are
-/// taken as exact, provided that this does not show in e*. With the number of independent columns.
-fn solve_dependent(problem: &ForceProblem, extent: Extent, reduced: Reduced) -> (Solved, usize) {
-    let clean = reduced.with_clean_dependences();
-    let exact = match &clean {
-        Some(clean) => (&clean.reduced, clean.rank),
-        None => (&reduced, reduced.counted()),
-    };
-    if let Some(solved) = solve_strong(problem, extent, &reduced, exact) {
-        return (solved, exact.1);
-    }
-    let clean = clean.map(|clean| {
-        let moved = clean.most_moved(problem);
-        let mut solved = Solved::new(problem, extent, clean.reduced);
-        let change = solved.change(moved);
-        solved.error += change;
-        (solved, clean.rank, change)
-    });
-    let clean = clean.filter(|(clean, _, _)| clean.reliable());
-    match clean {
-        Some((clean, rank, change)) if change <= SHOWN => (clean, rank),
-        clean => {
-            let literal = Solved::new(problem, extent, reduced);
-            match clean.filter(|_| !literal.reliable()) {
-                Some((clean, rank, _)) => (clean, rank),
-                None => {
-                    let rank = literal.reduced.rank();
-                    (literal, rank)
-                }
-            }
-        }
-    }
-}
-
-/// Without the weak parts of columns, which add hundreds of breakpoints, decided by rounding where the force can be
-/// rendered all but exactly: they count for e_0 only, whose currents have no limit. `exact` has the given number of
-/// independent columns. `None` where a bound does not say that this is enough.
-fn solve_strong(
-    problem: &ForceProblem,
-    extent: Extent,
-    reduced: &Reduced,
-    (exact, rank): (&Reduced, usize),
-) -> Option<Solved> {
-    let share = match extent {
-        Extent::Whole => WEAK,
-        Extent::ToJnd(_) => WEAK_FOR_JND,
-    };
-    // The path over few points is straight as long as the force is exact.
-    if problem.points() < reduced.counted() || problem.offset_n.is_some() {
-        return None;
-    }
-    let strong = reduced.without_weak_parts(share)?;
-    if strong.rank == rank {
-        return None;
-    }
-    let moved = strong.most_moved(problem);
-    let length = |v: &[Num]| Num::dot(v, v).sqrt();
-    let heights = strong.reduced.heights();
-    let (height, weak) = (length(heights), length(&heights[strong.rank..]));
-    // No path changes that.
-    if matches!(extent, Extent::Whole) && weak * weak > Num::of(SHOWN) * height * height {
-        return None;
-    }
-    let free = Unlimited::new(problem, exact);
-    let mut solved = Solved::with(problem, extent, strong.reduced, free);
-    // The change is largest at the first breakpoint; lambda_jnd lies on the last piece but that of rest.
-    let pieces = &solved.limited.pieces;
-    let start = |place: usize| pieces.get(place).map(|piece| piece.start);
-    let (change, most) = match extent {
-        Extent::Whole => {
-            let requested = start(1)? * height;
-            let share = weak / height + moved / requested;
-            (share * share, SHOWN)
-        }
-        Extent::ToJnd(weight) => {
-            let requested = start(pieces.len().saturating_sub(2).max(1))? * height;
-            let share = moved / requested;
-            let change = (Num::of(2.0) * weak / height + share) * share;
-            (change, SMALL * weight * weight)
-        }
-    };
-    let change = change.to_f64();
-    solved.error += change;
-    solved.doubt = change;
-    (solved.reliable() && change <= most).then_some(solved)
-}
-
 /// lambda_linear and lambda_jnd, N/m, off the two paths; null where no height is above zero.
 fn first_and_jnd(
     settings: &Settings,
@@ -498,13 +165,7 @@ fn first_and_jnd(
     comparison: &Comparison<'_>,
     rank: usize,
 ) -> (Option<f64>, Option<f64>) {
-    let linear = if comparison.mean_square <= Num::ZERO {
-        None
-    } else if rank == solved.reduced.counted() {
-        comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
-    } else {
-        comparison.linear_by_error()
-    };
+    let linear = solved.linear(comparison, rank);
     let jnd = match linear {
         None => None,
         Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
@@ -587,7 +248,8 @@ fn finish<T: Real>(
     let at = settings.at_n_per_m.map(evaluate);
     let accuracy = accuracy_of::<T>(problem, settings, solved, &path, chosen.as_ref());
     let gap = |at: f64| evaluate(at).duality_gap_n2 / (at * rms_height_m).powi(2);
-    let is_harmless = || harmless(settings, solved, &accuracy, [jnd, saturation], gap);
+    let optimal = |lambda: Option<f64>| lambda.is_none_or(|at| gap(at) <= ROUGH);
+    let is_harmless = || harmless(settings, solved, &accuracy) && optimal(saturation);
     let status = match status {
         Status::Stalled if is_harmless() => Status::Solved,
         status => status,
@@ -611,18 +273,10 @@ fn finish<T: Real>(
     }
 }
 
-/// Whether a flaw of the path does not matter: `gap` proves the currents at lambda_jnd and saturation to be optimal.
-fn harmless(
-    settings: &Settings,
-    solved: &Solved,
-    accuracy: &StageAccuracy,
-    [jnd, saturation]: [Option<f64>; 2],
-    gap: impl Fn(f64) -> f64,
-) -> bool {
-    let optimal = |lambda: Option<f64>| lambda.is_none_or(|at| gap(at) <= ROUGH);
+/// Whether a flaw of the path does not matter where its end is right: `accuracy` is what is proven at lambda_jnd.
+fn harmless(settings: &Settings, solved: &Solved, accuracy: &StageAccuracy) -> bool {
     let followed = solved.limited.complete && solved.unlimited.complete;
-    let by_proof = settings.criterion == Criterion::Jnd && accuracy.estimate <= ROUGH;
-    followed && by_proof && jnd.is_some() && optimal(jnd) && optimal(saturation)
+    followed && settings.criterion == Criterion::Jnd && accuracy.estimate <= ROUGH
 }
 
 /// The error of e*: the bound on the path's, or where that is rough what is proven of e* - e_0 at lambda_jnd, the
@@ -649,7 +303,7 @@ fn accuracy_of<T: Real>(
     let square = |lambda: f64| (lambda * problem.rms_height_m()).powi(2);
     let least = NEAR_ZERO.map(|part| {
         let lambda = part * jnd.lambda_n_per_m;
-        let check = certificate::check::<T>(problem, lambda, &path.currents_a(lambda));
+        let check = certificate::check::<T>(problem, lambda, &path.fitting_a(lambda));
         check.mean_square_n2 / square(lambda)
     });
     let gap = jnd.duality_gap_n2 / square(jnd.lambda_n_per_m);
@@ -696,74 +350,6 @@ mod tests {
                 &problem, &largest, &settings, &solved, path, rank, precision,
             );
             assert_eq!(finished.status, status, "{share}");
-        }
-    }
-
-    /// Dipoles 10 mm apart under points 200 mm above: what is left out of nearly dependent columns changes e* by no more
-    /// than is said, and lambda_jnd not at all.
-    #[test]
-    fn weak_parts_of_columns_leave_the_force_alone() {
-        let (side, samples, height) = (7, 9, 0.2_f64);
-        let force = |i: usize, j: usize| {
-            let middle = |k: usize, of: usize| k as f64 - 0.5 * (of as f64 - 1.0);
-            let apart = |a: usize, b: usize| 0.01 * (middle(a, side) - middle(b, samples));
-            let flat = apart(i % side, j % samples).powi(2) + apart(i / side, j / samples).powi(2);
-            1e-5 * height * (2.0 * height.powi(2) - 3.0 * flat) / (flat + height.powi(2)).powf(3.5)
-        };
-        let (coils, points) = (side * side, samples * samples);
-        let forces: Vec<f64> = (0..points)
-            .flat_map(|j| (0..coils).map(move |i| force(i, j)))
-            .collect();
-        let all = |value: f64| vec![value; coils];
-        // What uneven currents give, so that limits alone leave an error.
-        let heights: Vec<f64> = (forces.chunks_exact(coils))
-            .map(|row| {
-                let currents = (0..coils).map(|i| 1.0 + 0.5 * (i as f64).sin());
-                row.iter().zip(currents).map(|(f, i)| f * i).sum::<f64>()
-            })
-            .collect();
-        let problem = ForceProblem {
-            forces_n_per_a: &forces,
-            height_m: &heights,
-            offset_n: None,
-            weights: None,
-            lower_a: &all(0.0),
-            upper_a: &all(2.0),
-            total_max_a: None,
-            resistance_ohm: &all(6.1),
-        };
-        let weight = Settings::default().jnd_weight;
-        let reduced = Reduced::new::<Num>(&problem, &largest_entries(&problem));
-        let (exact, rank) = match reduced.with_clean_dependences() {
-            Some(clean) => (clean.reduced, clean.rank),
-            None => (reduced.clone(), coils),
-        };
-        let literal = Solved::new(&problem, Extent::Whole, exact.clone());
-        let jnd = |solved: &Solved| solved.comparison().jnd(weight).unwrap().to_f64();
-        let e = |solved: &Solved, lambda: Num| {
-            let pieces = &solved.limited.pieces;
-            let later = pieces.partition_point(|piece| piece.start <= lambda);
-            let residual = pieces[later - 1].residual_at(lambda);
-            Num::dot(&residual, &residual)
-        };
-        for extent in [Extent::Whole, Extent::ToJnd(weight)] {
-            let strong = solve_strong(&problem, extent, &reduced, (&exact, rank)).unwrap();
-            assert!(strong.reduced.heights().len() < rank && strong.doubt > 0.0);
-            assert!((jnd(&strong) / jnd(&literal) - 1.0).abs() < 1e-9);
-            let until = match extent {
-                Extent::Whole => 3.0,
-                Extent::ToJnd(_) => 1.0,
-            };
-            for k in 1..40 {
-                let lambda = Num::of(until * jnd(&literal) * f64::from(k) / 40.0);
-                let requested = lambda * lambda * literal.comparison().mean_square;
-                let off = ((e(&strong, lambda) - e(&literal, lambda)) / requested).to_f64();
-                let known = match extent {
-                    Extent::Whole => strong.doubt,
-                    Extent::ToJnd(weight) => SMALL * weight * weight,
-                };
-                assert!(off.abs() <= known, "{k}: {off:e} {known:e}");
-            }
         }
     }
 }

@@ -21,6 +21,7 @@ mod optimize;
 mod optimize_array;
 mod optimize_choices;
 mod optimize_limits;
+mod optimize_page;
 mod placement;
 mod scan;
 mod scan_fit;

@@ -689,6 +689,41 @@ fn regression_the_error_at_lambda_jnd_was_that_of_currents_without_limits() {
     assert!(accuracy.method.starts_with("duality gap"), "{accuracy:?}");
 }
 
+/// The path of weak parts, nearly all of them rounding, cannot be followed to its end: no lambda was chosen.
+#[test]
+fn regression_rounding_in_weak_parts_left_lambda_unknown() {
+    let (side, points, span) = (16, 15, 0.1);
+    let (mut forces, mut heights) = (Vec::new(), Vec::new());
+    for k in 0..points * points {
+        let at = |k: usize| span * (k as f64 / (points - 1) as f64 - 0.5);
+        let (x, y) = (at(k / points), at(k % points));
+        let height = 0.03 + 0.015 * (1.0 - (x * x + y * y) / (span * span));
+        heights.push(height);
+        for i in 0..side * side {
+            let at = |i: usize| 0.02 * (i as f64 - 0.5 * (side - 1) as f64);
+            let flat = (x - at(i % side)).powi(2) + (y - at(i / side)).powi(2);
+            let z = height;
+            forces.push(1e-7 * z * (2.0 * z * z - 3.0 * flat) / (flat + z * z).powf(3.5));
+        }
+    }
+    let all = |value: f64| vec![value; side * side];
+    let case = Case {
+        forces,
+        heights,
+        offset: None,
+        lower: all(-1.0),
+        upper: all(2.0),
+        total: None,
+        ohm: all(5.0),
+    };
+    let solution = solve(&case.problem(), &Settings::default()).expect("well formed");
+    assert_eq!(solution.status, Status::Solved);
+    let chosen = solution.chosen.expect("lambda_jnd");
+    let requested = (chosen.lambda_n_per_m * case.problem().rms_height_m()).powi(2);
+    assert!(chosen.duality_gap_n2 < 1e-9 * requested, "{chosen:?}");
+    assert!(solution.accuracy.estimate < 1e-9, "{:?}", solution.accuracy);
+}
+
 /// Coils too many for a path, without any height, with and without an offset.
 #[test]
 fn no_heights_leave_no_constants_and_a_finite_error() {

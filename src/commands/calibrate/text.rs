@@ -228,14 +228,15 @@ fn left_out(report: &CalibrateReport) -> String {
         }
     }
     let line = |(what, of): (&str, Vec<(&str, &LeftOut)>)| {
-        let (shape, first) = of[0];
+        let first = of[0].1;
         if of.iter().all(|(_, part)| *part == first) {
             let text = describe::left_out(std::slice::from_ref(first));
             let of_all = of.len() == report.bundles.len();
             return if of_all {
                 text
             } else {
-                format!("{shape}: {text}")
+                let shapes: Vec<&str> = of.iter().map(|(shape, _)| *shape).collect();
+                format!("{}: {text}", shapes.join(", "))
             };
         }
         let costs: Vec<String> = (of.iter())

@@ -182,7 +182,7 @@ fn binds_at_zero(problem: &ForceProblem) -> String {
         };
         return format!(
             "the current {limits} {} {are} 0 A; raise {them}, or leave coils that carry no current out of the \
-             array (positions_mm)",
+             array (positions_mm); of a coil with a core `lambda --broken` keeps the core",
             dead.join(", ")
         );
     }

@@ -16,7 +16,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::outlet::{Outlet, give};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::start::{accuracy_check, begin, write_to};
+use crate::cli::start::{accuracy_check, begin, is_written, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
 
@@ -167,7 +167,7 @@ impl Optimize {
             |outlet| self.write(outlet, &files, &result, printer),
             |place| {
                 let json = printer.with_warnings(&result);
-                printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))
+                printer.summary(place, &json, || text::summary(&result))
             },
         )?;
         if let Some(none) = &result.no_coil {
@@ -230,6 +230,7 @@ impl Optimize {
             place = write_to(self.out.as_ref(), files.overwrite, printer, |out| {
                 write!(out, "{}\n{text}", files.mark)
             })?;
+            is_written(self.out.as_ref(), printer);
         }
         if outlet.takes(self.report.as_ref())
             && let Some(page) = &files.page

@@ -1,7 +1,9 @@
 //! The numbers of a coil by which the best one is compared with the design's own, on screen and page.
 
-use super::result::Optimization;
+use super::result::{Objective, Optimization};
 use crate::coil::circuit::CoilSize;
+use crate::report::limits::label;
+use crate::report::number::force;
 use crate::scene::rated::CircuitSummary;
 
 /// A coil alone, the best one or the given one.
@@ -30,6 +32,28 @@ pub(super) const PROPERTIES: [Property; 12] = [
     ("mass_kg", |of| of.circuit.mass_kg),
     ("power_w", |of| of.circuit.power_w),
 ];
+
+/// The label of a number: limits may bound another settling, that among neighbours or of a driver's loop.
+pub(super) fn name((key, _): Property) -> String {
+    match key {
+        "settling_s" => format!("{}, 5 L/R", label(key)),
+        key => label(key),
+    }
+}
+
+/// What the force of the best coil leaves out, in words: its neighbours in what is compared, the pull of its core in all.
+pub(super) fn beside_the_force(objective: &Objective) -> Vec<String> {
+    let alone = objective.alone_force_n.map(|alone| {
+        format!(
+            "among its neighbours' cores; {} alone, as in the table below",
+            force(alone.abs())
+        )
+    });
+    let pull = objective
+        .passive_force_n
+        .map(|pull| format!("also, the unpowered steel pulls with {}", force(pull)));
+    alone.into_iter().chain(pull).collect()
+}
 
 impl Optimization {
     /// The best coil and the design's own, where there are such.

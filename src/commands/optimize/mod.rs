@@ -36,6 +36,7 @@ use crate::coil::optimum::{
 };
 use crate::design::{Design, Limits};
 use crate::progress::{Progress, Silent};
+use crate::report::number::force;
 use crate::scene::rated::Rated;
 use crate::scene::steel;
 use crate::scene::{Scene, coupled};
@@ -181,6 +182,7 @@ pub fn optimize(
         result.design_text = Some(written.text);
     }
     result.take_given(given, design);
+    result.warn_of_pull();
     if has_iron {
         let alone = "one coil with its core alone is optimised: [plate] and [[iron]] stay in the design, but do not \
                      count; `optimize --for SHAPE` searches arrays with them";
@@ -226,6 +228,23 @@ impl Optimization {
         self.accuracy = rated.accuracy;
         self.agreement(best.force_n, force_n, "evaluate's");
         self.warnings = rated.warnings;
+    }
+
+    /// The pull of the unpowered core does not take part in the search of one coil.
+    fn warn_of_pull(&mut self) {
+        let Some(objective) = &self.objective else {
+            return;
+        };
+        let Some(pull_n) = objective.passive_force_n.filter(|&pull_n| pull_n != 0.0) else {
+            return;
+        };
+        let whole_n = objective.force_n + pull_n;
+        self.warnings.push(format!(
+            "the force of the current is optimised, not the pull of the unpowered core, {}; with it {} is left: another coil \
+             may leave more (`evaluate` counts both, `optimize --for SHAPE` searches with both)",
+            force(pull_n),
+            force(whole_n)
+        ));
     }
 
     /// Names those of `limits` on more than the coil that the best one misses, or that follow from shapes.

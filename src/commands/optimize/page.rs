@@ -2,15 +2,15 @@
 
 use serde_json::{Map, Value};
 
-use super::compared::{ComparedCoil, PROPERTIES, Property};
+use super::compared::{ComparedCoil, PROPERTIES, Property, beside_the_force, name};
 use super::result::Optimization;
-use super::text::{before_whole, better};
+use super::text::{before_whole, better, misses, nearest};
 use crate::coil::optimum::LimitUse;
 use crate::coil::optimum::outcome::Alternative;
 use crate::report::frame::{Page, Section, foot};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;
-use crate::report::limits::{in_unit, label, words};
+use crate::report::limits::{in_unit, words};
 use crate::report::number::{count, figures, force, mm, percent, si};
 
 /// The result of `optimize` as one HTML page.
@@ -25,10 +25,20 @@ pub fn html(result: &Optimization) -> String {
             figures(best.current_a, 4),
             mm(best.height_m)
         ),
-        (None, Some(none)) => format!("There is no such coil: {}", none.message),
+        (None, Some(none)) => {
+            let nearest =
+                nearest(result).map_or_else(String::new, |nearest| format!(" Nearest: {nearest}."));
+            format!(
+                "There is no such coil: {}.{nearest}",
+                none.message.trim_end_matches('.')
+            )
+        }
         (None, None) => "There is no such coil.".to_owned(),
     };
     lead.element("p class=\"lead\"", &text);
+    for beside in result.objective.iter().flat_map(beside_the_force) {
+        lead.element("p", &beside);
+    }
     Page {
         kind: "Optimisation",
         title: format!("The best coil of {}", result.design),
@@ -52,7 +62,7 @@ fn answer(result: &Optimization) -> Section {
             let unit = words(property.0).1;
             let cell = |coil: &ComparedCoil| in_unit(property.1(coil), unit);
             let given = given.as_ref().map_or_else(|| "\u{2013}".to_owned(), cell);
-            vec![label(property.0).into(), cell(&best).into(), given.into()]
+            vec![name(property).into(), cell(&best).into(), given.into()]
         };
         body.table(&Table {
             caption: "The best coil beside the design's own".to_owned(),
@@ -60,6 +70,9 @@ fn answer(result: &Optimization) -> Section {
             rows: PROPERTIES.into_iter().map(row).collect(),
             prose: false,
         });
+    }
+    if let Some(misses) = result.given.as_ref().and_then(misses) {
+        body.element("p class=\"note\"", &misses);
     }
     if !result.alternatives.is_empty() {
         let row = |one: &Alternative| -> Vec<Cell> {
@@ -104,12 +117,14 @@ fn said(result: &Optimization, limits: &[&LimitUse], body: &mut Html) {
         .map(|limit| words(limit.name.key()).0)
         .collect();
     body.raw("<ul class=\"said\">");
-    let text = if holding.is_empty() {
-        "No limit holds the force back.".to_owned()
-    } else {
-        format!("The force is held back by {}.", holding.join(", "))
-    };
-    body.element("li", &text);
+    if result.coil.is_some() {
+        let text = if holding.is_empty() {
+            "No limit holds the force back.".to_owned()
+        } else {
+            format!("The force is held back by {}.", holding.join(", "))
+        };
+        body.element("li", &text);
+    }
     if let Some(whose) = before_whole(result).filter(|_| !holding.is_empty()) {
         body.element(
             "li",
@@ -207,7 +222,10 @@ fn sure(result: &Optimization) -> Section {
             kind.open_question()
         ),
     };
-    body.raw("<ul class=\"said\">").element("li", &said);
+    body.raw("<ul class=\"said\">");
+    if result.coil.is_some() {
+        body.element("li", &said);
+    }
     let text = format!(
         "{}, {} of a coil, {} of coils bounded.",
         count(result.starts, "local search").replace("searchs", "searches"),

@@ -1,13 +1,12 @@
 //! The summary of `optimize`.
 
-use super::compared::{ComparedCoil, PROPERTIES};
+use super::compared::{ComparedCoil, PROPERTIES, beside_the_force, name};
 use super::{BestCoilSummary, GivenCoil, Objective, Optimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::{limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si, si_to};
-use crate::cli::values::FileArgument;
 use crate::coil::limits::{LimitName, MANDREL_M, WIRES_A_MANDREL};
 use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::problem::Regime;
@@ -17,7 +16,7 @@ use crate::report::limits::label;
 /// Most alternatives on screen; JSON has more.
 const SHOWN: usize = 6;
 
-pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
+pub fn summary(result: &Optimization) -> String {
     let kind = if result.wound {
         "the best coil that can be wound"
     } else {
@@ -27,9 +26,6 @@ pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
     match (&result.coil, &result.objective) {
         (Some(coil), Some(objective)) => best(&mut sheet, result, coil, objective),
         _ => none(&mut sheet, result),
-    }
-    if let (Some(FileArgument::Path(path)), true) = (out, result.design_text.is_some()) {
-        sheet.line("written to", &path.display().to_string());
     }
     if let Some((best, given)) = result.compared() {
         sheet.gap();
@@ -48,24 +44,25 @@ pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
 
 fn none(sheet: &mut Sheet, result: &Optimization) {
     sheet.line("result", "there is no such coil");
-    if let Some(none) = &result.no_coil
-        && let Some(least) = &none.least
-    {
-        let of = match result.continuous_force_n {
-            Some(_) => " of the whole coils next to the best one of any turns",
-            None => "",
-        };
-        sheet.line(
-            "nearest",
-            &format!(
-                "{} to {} diameter, {} long breaks the limits least{of}",
-                mm(least.inner_diameter_m),
-                mm(least.outer_diameter_m),
-                mm(least.length_m)
-            ),
-        );
+    if let Some(nearest) = nearest(result) {
+        sheet.line("nearest", &nearest);
     }
     sheet.line("searched", &searched(result));
+}
+
+/// The coil that misses the limits least, where there is none within them.
+pub(super) fn nearest(result: &Optimization) -> Option<String> {
+    let least = result.no_coil.as_ref()?.least.as_ref()?;
+    let of = match result.continuous_force_n {
+        Some(_) => " of the whole coils next to the best one of any turns",
+        None => "",
+    };
+    Some(format!(
+        "{} to {} diameter, {} long breaks the limits least{of}",
+        mm(least.inner_diameter_m),
+        mm(least.outer_diameter_m),
+        mm(least.length_m)
+    ))
 }
 
 fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, objective: &Objective) {
@@ -180,7 +177,7 @@ fn force_at_target(objective: &Objective) -> String {
         "up"
     };
     format!(
-        "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
+        "{} {way} on the magnet, {} above the coil at {}, the {} limit{}",
         force(objective.force_n.abs()),
         mm(objective.height_m),
         si(objective.current_a, "A"),
@@ -188,15 +185,7 @@ fn force_at_target(objective: &Objective) -> String {
             Regime::Supply => "supply's",
             Regime::Driver => "driver's",
         },
-        objective.alone_force_n.map_or_else(String::new, |alone| {
-            format!(
-                "\namong its neighbours' cores; {} alone, as in the table below",
-                force(alone.abs())
-            )
-        }),
-        objective.passive_force_n.map_or_else(String::new, |pull| {
-            format!("\nalso, the unpowered steel pulls with {}", force(pull))
-        })
+        (beside_the_force(objective).iter()).fold(String::new(), |all, one| all + "\n" + one)
     )
 }
 
@@ -251,7 +240,7 @@ fn above(bound_n: f64) -> String {
 }
 
 /// The limits that the design's own coil misses.
-fn misses(given: &GivenCoil) -> Option<String> {
+pub(super) fn misses(given: &GivenCoil) -> Option<String> {
     let unmet: Vec<String> = given
         .limits
         .iter()
@@ -304,10 +293,11 @@ fn sensitivity(used: &LimitUse) -> String {
 fn beside(best: &ComparedCoil, given: Option<&ComparedCoil>) -> String {
     let mut rows = vec![vec![String::new(), "best".to_owned()]];
     rows[0].extend(given.map(|_| "as given".to_owned()));
-    rows.extend(PROPERTIES.map(|(key, value)| {
+    rows.extend(PROPERTIES.map(|property| {
+        let (key, value) = property;
         let cell = |coil| limit_value(key, value(coil));
         let cells = [best].into_iter().chain(given).map(cell);
-        std::iter::once(label(key)).chain(cells).collect()
+        std::iter::once(name(property)).chain(cells).collect()
     }));
     table("lrr", &rows)
 }

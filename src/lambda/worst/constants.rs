@@ -26,6 +26,8 @@ const FAR: f64 = (1 << 20) as f64;
 const NEAR: f64 = 4.0;
 /// Shares of the largest force by which t* is not known at a vertex, or within: then nothing is.
 const MOST_DOUBT: [f64; 2] = [1e-6, 1e-2];
+/// Multiplications by the number of coils cubed that currents without error are worth: a path can begin without them.
+const SHORT: usize = 100;
 /// More lines than lead to any constant.
 const LINES: usize = 200;
 
@@ -122,6 +124,7 @@ pub(crate) fn without_error(problem: &ForceProblem, share: f64) -> Option<(f64, 
     let largest = largest_entries(problem);
     let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
     let mut limited = Doubles::new(&scaled, Form::Worst);
+    limited.work = limited.work.min(SHORT * problem.coils().pow(3));
     let mut lambda = Num::of(FAR);
     for _ in 0..LINES {
         fluxform_base::progress::poll();

@@ -86,7 +86,8 @@ pub(super) struct Doubles<'s, 'a> {
     /// Exchanges so far.
     exchanges: usize,
     /// Multiplications that are left.
-    work: usize,
+    /// Multiplications that are left.
+    pub work: usize,
     random: Random,
 }
 

@@ -112,8 +112,21 @@ impl Page {
             .raw("</script>\n<script>")
             .raw(&script)
             .raw("</script>\n</body>\n</html>\n");
-        html.finish()
+        with_distinct_clips(&html.finish())
     }
+}
+
+/// The page with clip paths of different names in different drawings: a browser takes the first of a name.
+fn with_distinct_clips(page: &str) -> String {
+    const NAME: &str = "kuva-clip-";
+    const BEGINNING: &str = "<svg ";
+    let mut drawings = page.split(BEGINNING);
+    let mut all = drawings.next().unwrap_or("").to_owned();
+    for (number, drawing) in drawings.enumerate() {
+        all.push_str(BEGINNING);
+        all.push_str(&drawing.replace(NAME, &format!("clip-{number}-")));
+    }
+    all
 }
 
 /// How a policy names a text that it lets in.
@@ -165,6 +178,18 @@ mod tests {
                 .replace("http://www.w3.org/2000/svg", "")
                 .replace("url(#", "");
             assert!(!own.contains(outside), "{outside}");
+        }
+    }
+
+    /// The second of two drawings was cut to the first one's rectangle.
+    #[test]
+    fn regression_drawings_of_one_page_shared_their_clip_paths() {
+        let drawing =
+            "<svg ><clipPath id=\"kuva-clip-0\"/><g clip-path=\"url(#kuva-clip-0)\"/></svg>";
+        let page = with_distinct_clips(&format!("<main>{drawing}{drawing}</main>"));
+        for own in ["clip-0-0", "clip-1-0"] {
+            assert_eq!(page.matches(&format!("id=\"{own}\"")).count(), 1, "{page}");
+            assert_eq!(page.matches(&format!("url(#{own})")).count(), 1, "{page}");
         }
     }
 

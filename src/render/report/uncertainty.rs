@@ -133,7 +133,7 @@ pub(super) fn section(object: &CalibratedObject) -> Option<Section> {
     let mut body = Html::default();
     body.element("p", &explained(object, study));
     body.raw("<figure>")
-        .raw(&plot(object, study).drawing().svg())
+        .raw(&plot(object, study).drawing().markup())
         .raw("</figure>");
     let row = |(name, error): &(&str, &CurrentsError)| -> Vec<Cell> {
         let (promised, realised) = (&error.promised, &error.realised);

@@ -22,7 +22,7 @@ use crate::cli::help::EVALUATIONS;
 use crate::cli::outlet::{Outlet, give};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::start::{begin, write_to};
+use crate::cli::start::{begin, is_written, write_to};
 use crate::cli::values::{self, FileArgument};
 use crate::coil::array_search::choice::choices;
 use crate::coil::array_search::problem::Level;
@@ -274,15 +274,6 @@ impl ArrayFlags {
         for warning in ended.iter().flat_map(|result| &result.warnings) {
             printer.warning(warning);
         }
-        let is_kept = |result: &ArrayOptimization| result.status == ArrayEnding::Interrupted;
-        if let (Some(FileArgument::Path(path)), true, false) =
-            (shared.out, ended.as_ref().is_ok_and(is_kept), shared.force)
-        {
-            printer.warning(&format!(
-                "{} holds the best array so far; the same command with --force replaces it",
-                shown_path(path)
-            ));
-        }
         let mut kept = Ok(Stream::Output);
         let given = give(
             |outlet| {
@@ -301,7 +292,7 @@ impl ArrayFlags {
             |place| match &ended {
                 Ok(result) => {
                     let json = printer.with_warnings(result);
-                    printer.summary(place, &json, || text::summary(result, shared.out, seconds))
+                    printer.summary(place, &json, || text::summary(result, seconds))
                 }
                 Err(_) => Ok(()),
             },
@@ -311,6 +302,14 @@ impl ArrayFlags {
         }
         given?;
         let result = ended?;
+        if let (Some(FileArgument::Path(path)), ArrayEnding::Interrupted, false) =
+            (shared.out, &result.status, shared.force)
+        {
+            printer.notice(&format!(
+                "{} holds the best array so far; the same command with --force replaces it",
+                shown_path(path)
+            ));
+        }
         kept.map(|_| (result.status, result.missed()))
     }
 
@@ -382,6 +381,7 @@ impl ArrayFlags {
             place = write_to(shared.out, &outputs.marked, printer, |out| {
                 out.write_all(design.as_bytes())
             })?;
+            is_written(shared.out, printer);
         }
         if outlet.takes(self.front.as_ref()) {
             let table = tables::csv(result);

@@ -6,16 +6,11 @@ use crate::accuracy::CertificateKind;
 use crate::cli::layout::{Sheet, table};
 use crate::cli::limits::limit_row;
 use crate::cli::quantity::{count, number, percent, si};
-use crate::cli::values::FileArgument;
 use crate::coil::array_search::study::Study;
 use crate::coil::array_search::worth::LimitWorth;
 use crate::coil::limits::by_key;
 
-pub fn summary(
-    result: &ArrayOptimization,
-    out: Option<&FileArgument>,
-    seconds: &[(String, f64)],
-) -> String {
+pub fn summary(result: &ArrayOptimization, seconds: &[(String, f64)]) -> String {
     let mut sheet = Sheet::new(&format!(
         "{}: the array that renders the shapes best",
         result.design
@@ -26,9 +21,6 @@ pub fn summary(
     };
     sheet.line("gain", &format!("{} times {given}", number(result.gain)));
     sheet.line("ended", &ended(result));
-    if let Some(FileArgument::Path(path)) = out {
-        sheet.line("written to", &path.display().to_string());
-    }
     let took: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
     sheet.line("took", &si(took, "s"));
     if let Some(search) = result.levels.iter().find(|level| level.level == "search") {
