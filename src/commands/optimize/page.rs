@@ -37,22 +37,34 @@ pub fn html(result: &Optimization) -> String {
     };
     lead.element("p class=\"lead\"", &text);
     for beside in result.objective.iter().flat_map(beside_the_force) {
-        lead.element("p", &beside);
+        lead.element("p", &sentence(&beside));
     }
     Page {
         kind: "Optimisation",
         title: format!("The best coil of {}", result.design),
         lead,
-        sections: vec![
-            answer(result),
-            limits(result),
-            sure(result),
-            sources(&result.inputs),
-        ],
+        sections: [
+            Some(answer(result)),
+            result.coil.as_ref().map(|_| limits(result)),
+            Some(sure(result)),
+            Some(sources(&result.inputs)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         data: Value::Object(Map::new()),
         foot: foot(result.fluxform_version, ""),
     }
     .html()
+}
+
+/// A part of the screen's summary as a sentence.
+fn sentence(part: &str) -> String {
+    let mut letters = part.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
 fn answer(result: &Optimization) -> Section {
@@ -72,7 +84,7 @@ fn answer(result: &Optimization) -> Section {
         });
     }
     if let Some(misses) = result.given.as_ref().and_then(misses) {
-        body.element("p class=\"note\"", &misses);
+        body.element("p class=\"note\"", &sentence(&misses));
     }
     if !result.alternatives.is_empty() {
         let row = |one: &Alternative| -> Vec<Cell> {
@@ -117,14 +129,12 @@ fn said(result: &Optimization, limits: &[&LimitUse], body: &mut Html) {
         .map(|limit| words(limit.name.key()).0)
         .collect();
     body.raw("<ul class=\"said\">");
-    if result.coil.is_some() {
-        let text = if holding.is_empty() {
-            "No limit holds the force back.".to_owned()
-        } else {
-            format!("The force is held back by {}.", holding.join(", "))
-        };
-        body.element("li", &text);
-    }
+    let text = if holding.is_empty() {
+        "No limit holds the force back.".to_owned()
+    } else {
+        format!("The force is held back by {}.", holding.join(", "))
+    };
+    body.element("li", &text);
     if let Some(whose) = before_whole(result).filter(|_| !holding.is_empty()) {
         body.element(
             "li",
