@@ -68,7 +68,7 @@ fn every_file_that_was_written_is_named() {
     ];
     let ran = place.run(&args).ends(0);
     assert!(
-        ran.out.contains("best.toml") && ran.err.contains("best.html"),
+        ran.err.contains("best.toml") && ran.err.contains("best.html"),
         "{ran:?}"
     );
     let ran = place

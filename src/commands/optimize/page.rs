@@ -141,12 +141,16 @@ fn said(result: &Optimization, limits: &[&LimitUse], body: &mut Html) {
             &format!("What more of a limit gives is that {whose}."),
         );
     }
+    notes(result, body);
+    body.raw("</ul>");
+}
+
+fn notes(result: &Optimization, body: &mut Html) {
     for warning in &result.warnings {
         body.raw("<li><strong>Note:</strong> ")
             .text(warning)
             .raw("</li>");
     }
-    body.raw("</ul>");
 }
 
 fn limits(result: &Optimization) -> Section {
@@ -233,8 +237,11 @@ fn sure(result: &Optimization) -> Section {
         ),
     };
     body.raw("<ul class=\"said\">");
-    if result.coil.is_some() {
-        body.element("li", &said);
+    match result.coil {
+        Some(_) => {
+            body.element("li", &said);
+        }
+        None => notes(result, &mut body),
     }
     let text = format!(
         "{}, {} of a coil, {} of coils bounded.",
