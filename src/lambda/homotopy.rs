@@ -239,8 +239,10 @@ impl Follower<'_> {
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
             fluxform_base::progress::poll();
-            let given_up = self.most_changes.is_some_and(|most| basis.changes > most);
-            let Some((piece, event)) = self.leave(&state, basis).filter(|_| !given_up) else {
+            if self.most_changes.is_some_and(|most| basis.changes > most) {
+                break;
+            }
+            let Some((piece, event)) = self.leave(&state, basis) else {
                 break;
             };
             let lambda = event.map(|step| piece.start + step);
