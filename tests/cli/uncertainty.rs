@@ -172,6 +172,15 @@ fn a_replay_commands_the_currents_that_its_bundle_was_made_for() {
         assert!((realised / promised - 1.0).abs() < 0.1, "{felt}");
     }
     assert_eq!(found["made_with"]["robust"], true);
+    // Positions outside the map took their share of the displays with them.
+    place.write(
+        "out.csv",
+        "t_s,x_m,y_m,z_m\n0,0,0,0.05\n1,0.3,0,0.05\n2,0.3,0,0.05\n",
+    );
+    let mut args = [&replay[..], &["--format", "json"]].concat();
+    args.splice(2..6, ["out.csv"]);
+    let outside = place.run(&args).ends(0).json();
+    assert_eq!(outside["force"]["felt"]["draws"], 1000);
     let plain = place.run(&[&replay[..7], &["--format", "json"]].concat());
     let plain = plain.ends(0).json();
     assert_eq!(plain["force"]["felt"], Value::Null);

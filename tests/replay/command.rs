@@ -322,3 +322,30 @@ fn regression_the_map_s_largest_error_was_everywhere() {
         assert!(!known || stated < 10.0 * worst, "{stated} {worst}");
     }
 }
+
+/// The page and the fixed currents' line spoke of the first finger alone.
+#[test]
+fn regression_the_second_fingers_errors_were_left_out() {
+    let place = with_a_bundle();
+    place.write(
+        "pair.csv",
+        "t_s,x_m,y_m,z_m,x2_m,y2_m,z2_m\n0,0.003,0.007,0.05,0.03,0.02,0.052\n",
+    );
+    let ran = replay(&place, "flat pair.csv --report pair.html").ends(0);
+    let page = place.text("pair.html");
+    for finger in ["first finger", "second finger"] {
+        assert!(
+            ran.out.contains(&format!("{finger}: error rms")),
+            "{}",
+            ran.out
+        );
+        assert!(
+            page.contains(&format!("{finger}, with fixed currents")),
+            "{finger}"
+        );
+        assert!(
+            page.contains(&format!("With feedback the force on the {finger}")),
+            "{finger}"
+        );
+    }
+}

@@ -53,7 +53,7 @@ pub(super) struct Felt {
 }
 
 impl Felt {
-    /// For a bundle made with what is `given`, and so many positions.
+    /// For a bundle made with what is `given`, and so many positions inside its map.
     pub(super) fn new(given: Uncertainty, resistance_ohm: &[f64], positions: usize) -> Self {
         let coils = resistance_ohm.len();
         let given = Uncertainty {

@@ -92,13 +92,16 @@ struct At<'a> {
 }
 
 impl Follower {
-    /// Of a bundle's trajectory of so many positions.
+    /// Of a bundle's trajectory with these steps.
     pub(super) fn new(
         opened: &Opened,
         renderer: Renderer,
         bandwidth_hz: Option<f64>,
-        positions: usize,
+        steps: &[Steps],
     ) -> Self {
+        let inside = steps
+            .iter()
+            .filter(|steps| steps.first.answer != Answer::Outside);
         let fixed = opened.bundle.currents.iter();
         Self {
             renderer,
@@ -106,7 +109,7 @@ impl Follower {
             resistance_ohm: opened.bundle.map.runtime.resistance_ohm.clone(),
             bounds: Bounds::of(&opened.bundle),
             bandwidth_hz,
-            felt: opened.felt(positions),
+            felt: opened.felt(inside.count()),
             pushed_n: 0.0,
             cylinders: None,
         }

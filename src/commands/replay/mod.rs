@@ -277,7 +277,7 @@ pub fn run(
     let dynamics = drive
         .as_ref()
         .map(|drive| DynamicsSummary::of(drive, &opened.bundle, bandwidth_hz));
-    let mut follower = Follower::new(opened, renderer, bandwidth_hz, trajectory.len());
+    let mut follower = Follower::new(opened, renderer, bandwidth_hz, &steps);
     follower.cylinders = cylinders;
     let followed = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
     let pushed_n = follower.pushed_n;

@@ -32,11 +32,17 @@ pub fn html(report: &ReplayReport, below: &Below) -> String {
         Some(share) => percent(share),
         None => format!("{} mN", figures(errors.rms_error_n * 1e3, 3)),
     };
+    for (finger, force) in summary.fingers() {
+        let on = finger.map_or_else(String::new, |finger| format!(" on the {finger}"));
+        let text = format!(
+            "With feedback the force{on} is off by {} (rms), with fixed currents by {}.",
+            share(&force.feedback),
+            share(&force.fixed)
+        );
+        lead.element("p class=\"lead\"", &text);
+    }
     let text = format!(
-        "With feedback the force is off by {} (rms), with fixed currents by {}; {} of the time the limits bind, \
-         {} of it is outside the map. The forces are known to {} mN.",
-        share(&summary.force.feedback),
-        share(&summary.force.fixed),
+        "{} of the time the limits bind, {} of it is outside the map. The forces are known to {} mN.",
         percent(summary.saturated_time_fraction),
         percent(summary.outside_time_fraction),
         figures(summary.force_error_n() * 1e3, 2)
@@ -135,7 +141,7 @@ fn whole(report: &ReplayReport) -> Section {
         .element("figcaption", "Shaded: outside the map.")
         .raw("</figure>");
     let summary = &report.summary;
-    let row = |(name, errors): (&str, &ErrorSummary)| -> Vec<Cell> {
+    let row = |(name, errors): (String, &ErrorSummary)| -> Vec<Cell> {
         let at = errors.worst_at.as_ref();
         vec![
             name.into(),
@@ -149,10 +155,14 @@ fn whole(report: &ReplayReport) -> Section {
                 .into(),
         ]
     };
-    let both = [
-        ("with feedback", &summary.force.feedback),
-        ("with fixed currents", &summary.force.fixed),
-    ];
+    let fingers = summary.fingers().into_iter();
+    let rows = fingers.flat_map(|(finger, force)| {
+        let of = finger.map_or_else(String::new, |finger| format!("{finger}, "));
+        [
+            row((format!("{of}with feedback"), &force.feedback)),
+            row((format!("{of}with fixed currents"), &force.fixed)),
+        ]
+    });
     body.table(&Table {
         caption: "Error of the upward force".to_owned(),
         head: vec![
@@ -162,7 +172,7 @@ fn whole(report: &ReplayReport) -> Section {
             ("worst", true),
             ("at", true),
         ],
-        rows: both.into_iter().map(row).collect(),
+        rows: rows.collect(),
         prose: false,
     });
     Section {

@@ -478,15 +478,32 @@ impl ReplaySummary {
         }
     }
 
+    /// The forces on every finger, named where there are two.
+    pub(super) fn fingers(&self) -> Vec<(Option<&'static str>, &ForceSummary)> {
+        match &self.two_fingers {
+            None => vec![(None, &self.force)],
+            Some(two) => vec![
+                (Some("first finger"), &self.force),
+                (Some("second finger"), &two.second),
+            ],
+        }
+    }
+
     /// Estimate of the forces' error, N.
     pub(super) fn force_error_n(&self) -> f64 {
         self.accuracy[FORCE].estimate
     }
 
+    /// The largest force requested on any finger, N.
+    pub(super) fn wanted_max_n(&self) -> f64 {
+        let fingers = self.fingers().into_iter();
+        fingers.fold(0.0, |most, (_, force)| most.max(force.wanted_max_n))
+    }
+
     /// Warns where a finger notices the forces' error, of which `off_dipoles_n` is what cylinders push each other
     /// otherwise than dipoles.
     pub(super) fn warn_of_forces(&mut self, off_dipoles_n: f64) {
-        let wanted_n = self.force.wanted_max_n;
+        let wanted_n = self.wanted_max_n();
         let noticed = |error_n: f64| wanted_n > 0.0 && error_n > FORCE_JND * wanted_n;
         let of_cylinders = noticed(off_dipoles_n).then(|| {
             format!(

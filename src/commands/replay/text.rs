@@ -28,7 +28,7 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
             "{} N/m times the height, {}, at most {} upward",
             number(summary.lambda_n_per_m),
             direction(summary.force.vector.as_ref()),
-            force(summary.force.wanted_max_n)
+            force(summary.wanted_max_n())
         ),
     );
     forces(&mut sheet, "feedback", &summary.force);
@@ -62,13 +62,14 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
             ),
         );
     }
-    sheet.line(
-        "fixed",
-        &format!(
-            "{} (the bundle's static currents)",
-            errors(&summary.force.fixed)
-        ),
-    );
+    let fixed = summary.fingers().into_iter().map(|(finger, force)| {
+        let of = finger.map_or_else(String::new, |finger| format!("{finger}: "));
+        format!(
+            "{of}{} (the bundle's static currents)",
+            errors(&force.fixed)
+        )
+    });
+    sheet.line("fixed", &fixed.collect::<Vec<_>>().join("\n"));
     sheet.line("currents", &currents(summary));
     let power = &summary.power;
     sheet.line(
