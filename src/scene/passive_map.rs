@@ -42,6 +42,9 @@ pub struct PassiveMap {
     pub samples: usize,
     /// Evaluations of the pull that it took.
     pub evaluations: usize,
+    /// Its grid, and the table that it was read from.
+    grid: Grid,
+    table: Table,
 }
 
 impl PassiveMap {
@@ -107,7 +110,21 @@ impl PassiveMap {
             between,
             samples,
             evaluations,
+            grid: grid.clone(),
+            table,
         }))
+    }
+
+    /// By how much interpolation between the nodes is off, N, at those of `places_m` that lie inside the grid.
+    pub fn off_between_n(&self, places_m: &[[f64; 3]]) -> impl Iterator<Item = ([f64; 3], f64)> {
+        let Grid { x_m, y_m, z_m } = &self.grid;
+        places_m.iter().filter_map(|at| {
+            let cell = lagrange::locate([x_m, y_m, z_m], *at)?;
+            Some((
+                *at,
+                (cell.value(&self.force_z_n) - self.table.at(*at)).abs(),
+            ))
+        })
     }
 
     /// The sentence on [`PassiveMap::between`].

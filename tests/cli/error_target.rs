@@ -412,3 +412,32 @@ fn regression_the_largest_force_at_every_point_was_stated_far_off() {
         }
     }
 }
+
+/// The nodes were chosen for the currents' force alone: the map of the pull took more than was requested.
+#[test]
+fn regression_nodes_for_a_requested_error_did_not_count_the_pull() {
+    let place = Place::new();
+    place.write(
+        "one.toml",
+        "name = \"one\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\nlength_mm = 60.0\n\
+         [wire]\ndiameter_mm = 0.7\n[core]\nrelative_permeability = 1000.0\n\
+         [magnet]\npassive_force = true\n[supply]\ncurrent_max_a = 4.0\n\
+         [workspace]\nx_mm = [-15.0, 15.0, 21]\ny_mm = [-15.0, 15.0, 21]\nz_mm = [8.0, 40.0, 15]\n",
+    );
+    let low = "primitive = \"flat\"\nheight_mm = 14.7\nside_mm = 20.0\n";
+    let low = shape(&place, "low", low);
+    let args = [
+        "calibrate",
+        "one.toml",
+        &low,
+        "--error",
+        "1%",
+        "--refine",
+        "--format",
+        "json",
+    ];
+    let run = place.run(&args).ends(0).json();
+    let headline = &run["bundles"][0]["headline"];
+    assert_eq!(headline["requested"]["met"], true, "{headline}");
+    assert!(number(&headline["force_error"]) <= 0.01, "{headline}");
+}

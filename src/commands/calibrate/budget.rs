@@ -4,7 +4,7 @@
 use super::Calibration;
 use super::needed_map::NeededMap;
 use crate::RunError;
-use crate::bundle::headline::{BudgetName, BudgetPart};
+use crate::bundle::headline::BudgetName;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::commands::discretize::between_points::between_points;
 use crate::commands::discretize::fewest_points::fewest_divisions;
@@ -136,14 +136,11 @@ impl Calibration<'_> {
         let made = &needed.made;
         let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
         let interpolation = effect.interpolation(&made.map, progress)?;
-        // The pull's own table: of the largest pull, which is relative to the same force.
+        // The stated error at the nodes is of the largest pull, which is relative to the same force.
         let share = headline.error_of(BudgetName::Pull) / of_pull;
-        let pull = passive.filter(|_| share.is_finite()).map(|passive| BudgetPart {
-            part: BudgetName::PullMap,
-            error: share * (passive.accuracy.estimate + passive.between),
-            how: "the stated errors of the pull's map, times its largest share of the requested force"
-                .to_owned(),
-        });
+        let pull = passive.filter(|_| share.is_finite());
+        let pull =
+            pull.and_then(|passive| effect.of_pull(passive, share * passive.accuracy.estimate));
         headline.jumps = jumps;
         headline.add(
             [between, Some(nodes), interpolation, pull]

@@ -10,6 +10,8 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::felt_force::by_map;
+use crate::scene::passive;
+use crate::scene::passive_map::PassiveMap;
 use crate::scene::steel::Solved;
 use crate::shape::points::ConstraintPoints;
 use fluxform_base::least_request::lowest_requested_m;
@@ -103,8 +105,9 @@ impl MapEffect<'_> {
         Ok(samples)
     }
 
-    /// The largest relative difference between the field at `places` and its interpolation from a grid
-    /// of so many samples, of which only the nodes that take part are computed.
+    /// The largest relative difference between the force at `places` and its interpolation from a grid
+    /// of so many samples, of which only the nodes that take part are computed; with that of the unpowered steel's pull,
+    /// where that counts.
     fn interpolated_off(
         &self,
         samples: [usize; 3],
@@ -145,16 +148,23 @@ impl MapEffect<'_> {
                 .sum::<f64>()
         });
         let totals: Vec<f64> = total.collect();
-        let (mut largest, mut first) = (0.0_f64, 0);
-        for (place, own) in places.iter().zip(&weights) {
-            let Some(own) = own else { continue };
-            let interpolated: f64 = own.iter().zip(&totals[first..]).map(|(w, f)| w * f).sum();
-            let direct = totals[first + own.len()];
-            let off = (interpolated - direct).abs() / (self.lambda_n_per_m * place[2]);
-            largest = largest.max(off);
-            first += own.len() + 1;
-        }
-        Ok(largest)
+        // A runtime interpolates the pull in a map of its own, whose error adds up with that of the currents' force.
+        let pull = passive::counted(self.scene, &positions)?;
+        let pulls_n = pull.map(|pull| pull.forces_z_n(&positions));
+        let largest_off = |forces_n: &[f64]| {
+            let (mut largest, mut first) = (0.0_f64, 0);
+            for (place, own) in places.iter().zip(&weights) {
+                let Some(own) = own else { continue };
+                let interpolated: f64 =
+                    own.iter().zip(&forces_n[first..]).map(|(w, f)| w * f).sum();
+                let direct = forces_n[first + own.len()];
+                let off = (interpolated - direct).abs() / (self.lambda_n_per_m * place[2]);
+                largest = largest.max(off);
+                first += own.len() + 1;
+            }
+            largest
+        };
+        Ok(largest_off(&totals) + pulls_n.map_or(0.0, |pulls_n| largest_off(&pulls_n)))
     }
 
     /// The part of interpolation; `None` without a cell of four points within the map.
@@ -183,5 +193,22 @@ impl MapEffect<'_> {
                  {MOST_PLACES} places of the surface between its points"
             ),
         }))
+    }
+
+    /// The part of the pull's map, whose nodes are known to `at_nodes` of the requested force; `None` as of
+    /// [`Self::interpolation`].
+    pub(crate) fn of_pull(&self, passive: &PassiveMap, at_nodes: f64) -> Option<BudgetPart> {
+        let places = middles(self.points);
+        let off = passive.off_between_n(&places);
+        let relative = off.map(|([_, _, z_m], off_n)| off_n / (self.lambda_n_per_m * z_m));
+        relative.reduce(f64::max).map(|largest| BudgetPart {
+            part: BudgetName::PullMap,
+            error: at_nodes + MARGIN * largest,
+            how: format!(
+                "the stated error of the pull at the map's nodes, times its largest share of the requested force; and an \
+                 estimate of interpolation: {MARGIN} times its largest difference at up to {MOST_PLACES} places of the \
+                 surface between its points"
+            ),
+        })
     }
 }
