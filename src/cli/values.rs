@@ -1,9 +1,11 @@
 //! Argument values, validated where they are read.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{
+    PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser, ValueParser,
+    ValueParserFactory,
+};
 
 use crate::bundle::atomic;
 use crate::choice::Choice;
@@ -58,13 +60,22 @@ pub enum FileArgument {
     Path(PathBuf),
 }
 
-impl From<OsString> for FileArgument {
-    fn from(text: OsString) -> Self {
-        if text == "-" {
+impl From<PathBuf> for FileArgument {
+    fn from(path: PathBuf) -> Self {
+        if path == Path::new("-") {
             Self::Standard
         } else {
-            Self::Path(text.into())
+            Self::Path(path)
         }
+    }
+}
+
+/// Refuses an empty path, which an unset variable of a script leaves.
+impl ValueParserFactory for FileArgument {
+    type Parser = ValueParser;
+
+    fn value_parser() -> Self::Parser {
+        PathBufValueParser::new().map(Self::from).into()
     }
 }
 
@@ -87,7 +98,7 @@ impl FileArgument {
 
 /// A drawing's file: SVG, PNG or PDF by its ending, or `-` for SVG on standard output.
 pub fn picture(text: &str) -> Result<FileArgument, String> {
-    let file = FileArgument::from(OsString::from(text));
+    let file = FileArgument::from(PathBuf::from(text));
     let path = file.as_given();
     let ending = path.extension().and_then(|ending| ending.to_str());
     let known = ending.is_some_and(|ending| DrawingFormat::of(ending).is_some());

@@ -248,6 +248,17 @@ const MISTAKES: &[Mistake] = &[
         2,
         &["mm, cm, m, in, ft, um"],
     ),
+    // An unset variable of a script.
+    (
+        &["calibrate", SEED, "shapes/flat.toml", "--out", ""],
+        2,
+        &["a value is required for '--out <DIR>'"],
+    ),
+    (
+        &["init", "--out", ""],
+        2,
+        &["a value is required for '--out <DIR>'"],
+    ),
     // Bundles and what follows them.
     (
         &["replay", "results/seed_air/flat"],
