@@ -441,3 +441,35 @@ fn regression_nodes_for_a_requested_error_did_not_count_the_pull() {
     assert_eq!(headline["requested"]["met"], true, "{headline}");
     assert!(number(&headline["force_error"]) <= 0.005, "{headline}");
 }
+
+/// Between the points of one line there was no place to compare map and field at: nodes were chosen unseen, and the
+/// budget had no interpolation.
+#[test]
+fn regression_a_line_of_points_left_the_map_unchecked() {
+    let place = Place::new();
+    let line = "primitive = \"half-sphere\"\nradius_mm = 38.3\nbase_mm = 12.0\n\
+                [points]\nx_mm = [-35.0, 35.0, 41]\ny_mm = [0.0, 0.0, 1]\n";
+    let line = shape(&place, "line", line);
+    let nodes = ["5%", "0.5%"].map(|error| {
+        let args = [
+            "calibrate",
+            SEED,
+            &line,
+            "--error",
+            error,
+            "--refine",
+            "--force",
+            "--format",
+            "json",
+        ];
+        let run = place.run(&args).ends(0).json();
+        let headline = &run["bundles"][0]["headline"];
+        assert_eq!(headline["requested"]["met"], true, "{headline}");
+        let budget = headline["budget"].as_array().unwrap();
+        let interpolation = budget.iter().find(|part| part["part"] == "interpolation");
+        let interpolation = number(&interpolation.expect("an estimate")["error"]);
+        assert!(interpolation > 1e-6, "{headline}");
+        headline["requested"]["nodes"][0].as_u64().unwrap()
+    });
+    assert!(nodes[1] > nodes[0], "{nodes:?}");
+}

@@ -21,17 +21,20 @@ const MOST_PLACES: usize = 600;
 /// The largest difference found, times this, stands for the largest anywhere.
 const MARGIN: f64 = 1.5;
 
-/// Middles of cells whose four corners are points, with the mean of their heights.
+/// Middles of cells whose four corners are points, with the mean of their heights, or of a line's intervals; the
+/// points themselves where no cell is whole.
 fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
     let Some(lowest_m) = lowest_requested_m(points.height_m.iter().copied()) else {
         return Vec::new();
     };
     let rows = points.row_of_grid_point();
-    let columns = points.grid.x_m.samples;
-    let all: Vec<[f64; 3]> = (0..rows.len().saturating_sub(columns + 1))
-        .filter(|place| place % columns + 1 < columns)
+    let [columns, lines] = points.grid.samples();
+    let [right, above] = [columns, lines].map(|samples| usize::from(samples > 1));
+    let mut all: Vec<[f64; 3]> = (0..rows.len())
+        .filter(|place| place % columns + right < columns && place / columns + above < lines)
         .filter_map(|place| {
-            let corners = [place, place + 1, place + columns, place + columns + 1];
+            let next = place + above * columns;
+            let corners = [place, place + right, next, next + right];
             let mut middle = [0.0; 3];
             for corner in corners {
                 let row = rows[corner]?;
@@ -44,6 +47,11 @@ fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
             (middle[2] >= lowest_m).then_some(middle)
         })
         .collect();
+    if all.is_empty() {
+        let rows = 0..points.height_m.len();
+        let each = rows.map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
+        all = each.filter(|[_, _, z_m]| *z_m >= lowest_m).collect();
+    }
     some_of(&all, MOST_PLACES)
 }
 
@@ -167,7 +175,7 @@ impl MapEffect<'_> {
         Ok(largest_off(&totals) + pulls_n.map_or(0.0, |pulls_n| largest_off(&pulls_n)))
     }
 
-    /// The part of interpolation; `None` without a cell of four points within the map.
+    /// The part of interpolation; `None` where nothing is requested within the map.
     ///
     /// # Errors
     /// Forces that cannot be computed; interruption.
