@@ -413,10 +413,8 @@ fn regression_the_largest_force_at_every_point_was_stated_far_off() {
     }
 }
 
-/// The nodes were chosen for the currents' force alone: the map of the pull took more than was requested.
-#[test]
-fn regression_nodes_for_a_requested_error_did_not_count_the_pull() {
-    let place = Place::new();
+/// A design of one coil whose core pulls the magnet close above it.
+fn one_with_its_pull(place: &Place) {
     place.write(
         "one.toml",
         "name = \"one\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\nlength_mm = 60.0\n\
@@ -424,6 +422,13 @@ fn regression_nodes_for_a_requested_error_did_not_count_the_pull() {
          [magnet]\npassive_force = true\n[supply]\ncurrent_max_a = 4.0\n\
          [workspace]\nx_mm = [-15.0, 15.0, 21]\ny_mm = [-15.0, 15.0, 21]\nz_mm = [8.0, 40.0, 15]\n",
     );
+}
+
+/// The nodes were chosen for the currents' force alone: the map of the pull took more than was requested.
+#[test]
+fn regression_nodes_for_a_requested_error_did_not_count_the_pull() {
+    let place = Place::new();
+    one_with_its_pull(&place);
     let low = "primitive = \"flat\"\nheight_mm = 17.1\nside_mm = 20.0\n";
     let low = shape(&place, "low", low);
     let args = [
@@ -472,4 +477,22 @@ fn regression_a_line_of_points_left_the_map_unchecked() {
         headline["requested"]["nodes"][0].as_u64().unwrap()
     });
     assert!(nodes[1] > nodes[0], "{nodes:?}");
+}
+
+/// `map` said that its error held while that of the pull's map, in the same file, was many times larger.
+#[test]
+fn regression_a_map_of_a_requested_error_did_not_count_the_pull() {
+    let place = Place::new();
+    one_with_its_pull(&place);
+    let args = [
+        "map", "one.toml", "--error", "5%", "--refine", "--out", "map", "--format", "json",
+    ];
+    let run = place.run(&args).ends(0).json();
+    let sidecar: Value = serde_json::from_str(&place.text("map/map.json")).unwrap();
+    let between = number(&sidecar["map"]["passive_force"]["interpolation"]["largest_error"]);
+    let at_nodes = number(&sidecar["accuracy"]["passive_force_map"]["estimate"]);
+    let of_pull = number(&run["requested"]["of_pull"]);
+    assert!((of_pull / (between + at_nodes) - 1.0).abs() < 1e-12);
+    assert!(of_pull <= 0.05, "{of_pull}");
+    assert_eq!(run["requested"]["met"], true);
 }

@@ -31,7 +31,8 @@ use crate::scene::cost;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
 /// of interpolating between them are stated; of arrays with coupled steel cores also the compact form
 /// that stood for the steel, and its largest error at samples. With --error the nodes are as few as
-/// keep both errors together within it, relative to the largest |dBz/dz| at the height.
+/// keep both errors together within it, relative to the largest |dBz/dz| at the height; where the
+/// design includes the pull of unpowered steel, those of its map too.
 ///
 /// --vfield and --mpem write calibration files of mag_manip, ETH Zurich's runtime for magnetic
 /// manipulation: the field on nodes that span the workspace, and one step more where no coil is in the way,

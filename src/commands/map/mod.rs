@@ -227,8 +227,7 @@ pub fn run(
         arrays.working_point_gz_t_per_m = Some(Cow::Borrowed(&together.gz_t_per_m));
     }
     let mut accuracy = made.accuracy();
-    let passive = passive_map(&scene, &made.map.map, progress)?;
-    if let Some(passive) = &passive {
+    if let Some(passive) = &made.passive {
         add_pull(passive, &mut summary, &mut accuracy);
         arrays.passive_force_n = Some(Cow::Borrowed(&passive.force_z_n));
     }
@@ -269,9 +268,7 @@ pub fn run(
     progress.end();
     let picture = (request.picture).then(|| picture(design, &arrays, &scene.rated_currents_a()));
     drop(arrays);
-    let mut report = made.report(&scene, request, sidecar, picture);
-    (report.warnings).extend(passive.and_then(|passive| passive.warning));
-    Ok(report)
+    Ok(made.report(&scene, request, sidecar, picture))
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.
@@ -348,6 +345,7 @@ fn own_map(
 struct Made {
     solved: Solved,
     map: SceneMap,
+    passive: Option<PassiveMap>,
     together: Option<Together>,
     vector_field: Option<VectorFieldMade>,
     multipoles: Option<MultipolesMade>,
@@ -364,13 +362,14 @@ impl Made {
         let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
         let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
         let solved = solved(scene, lowest_m, progress)?;
-        let (grid, map) = match request
+        let (grid, map, passive) = match request
             .error
             .filter(|target| target.refine || !scene.design.workspace.is_given)
         {
             None => {
                 let map = own_map(scene, &solved, &grid, request.components, progress)?;
-                (grid, map)
+                let passive = passive_map(scene, &map.map, progress)?;
+                (grid, map, passive)
             }
             Some(target) => fewest_nodes(scene, &solved, target, request.components, progress)?,
         };
@@ -391,6 +390,7 @@ impl Made {
         Ok(Self {
             solved,
             map,
+            passive,
             together,
             vector_field,
             multipoles,
@@ -431,7 +431,7 @@ impl Made {
         warnings.extend(self.together.and_then(|together| together.warning));
         let requested = request
             .error
-            .map(|target| RequestedMap::new(&self.map, target));
+            .map(|target| RequestedMap::new(&self.map, self.passive.as_ref(), target));
         let over = requested.zip(request.error);
         warnings.extend(over.filter(|(requested, _)| !requested.met).map(|(requested, target)| {
             let advice = if scene.design.workspace.is_given && !target.refine {
@@ -439,8 +439,9 @@ impl Made {
             } else {
                 "; no more nodes are tried: a workspace that begins higher above the coils helps"
             };
-            target.exceeded("the map is off by up to", requested.of_map, advice)
+            target.exceeded("the map is off by up to", requested.largest(), advice)
         }));
+        warnings.extend(self.passive.and_then(|passive| passive.warning));
         MapReport {
             accuracy_missed: missed(&sidecar.accuracy, self.solved.tolerance),
             sidecar,
@@ -512,20 +513,29 @@ impl Together {
 pub struct RequestedMap {
     /// Requested of the map, at and between its nodes, relative to the largest |dB_z/dz| at the height.
     pub error: f64,
-    /// Whether it holds.
+    /// Whether it holds, of the pull too.
     pub met: bool,
     /// The error.
     pub of_map: f64,
+    /// That of the unpowered steel's pull, relative to the largest one at the height; where the design includes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of_pull: Option<f64>,
 }
 
 impl RequestedMap {
-    fn new(made: &SceneMap, target: ErrorTarget) -> Self {
-        let of_map = made.accuracy.estimate + made.between.largest;
-        Self {
+    fn new(made: &SceneMap, passive: Option<&PassiveMap>, target: ErrorTarget) -> Self {
+        let mut requested = Self {
             error: target.error,
-            met: of_map <= target.error,
-            of_map,
-        }
+            met: false,
+            of_map: made.accuracy.estimate + made.between.largest,
+            of_pull: passive.map(|pull| pull.accuracy.estimate + pull.between),
+        };
+        requested.met = requested.largest() <= target.error;
+        requested
+    }
+
+    fn largest(&self) -> f64 {
+        self.of_map.max(self.of_pull.unwrap_or(0.0))
     }
 }
 
@@ -541,17 +551,20 @@ const SPARE: f64 = 1.05;
 const FINER: std::ops::RangeInclusive<f64> = 1.1..=2.0;
 /// Fewest nodes along an axis: those of a cubic.
 const FEWEST: usize = 4;
+/// Share of the requested error that is left to interpolation at least.
+const OF_INTERPOLATION: f64 = 0.1;
 /// Most values of all coils' maps that are tried.
 const MOST_VALUES: f64 = 2e7;
 
-/// The fewest nodes of the workspace whose map holds a requested error, or the last that were tried, and the map.
+/// The fewest nodes of the workspace whose map holds a requested error, that of the pull too, or the last that were
+/// tried, and the maps.
 fn fewest_nodes(
     scene: &Scene,
     solved: &Solved,
     target: ErrorTarget,
     components: Components,
     progress: &dyn Progress,
-) -> Result<(Grid, SceneMap), RunError> {
+) -> Result<(Grid, SceneMap, Option<PassiveMap>), RunError> {
     let workspace = &scene.design.workspace;
     let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
     let sampled = |factor: f64| {
@@ -562,6 +575,10 @@ fn fewest_nodes(
             }
             axis
         })
+    };
+    // More nodes do not help where they are off themselves.
+    let over = |between: f64, at_nodes: f64| {
+        between / (target.error - at_nodes).max(OF_INTERPOLATION * target.error)
     };
     let (mut factor, mut attempt) = (FIRST, 1);
     loop {
@@ -574,7 +591,16 @@ fn fewest_nodes(
         };
         // The vertical component is the one whose interpolation is judged.
         let trial = own_map(scene, solved, &grid, Components::Gz, progress)?;
-        let excess = trial.between.largest / (target.error - trial.accuracy.estimate).max(0.0);
+        let mut excess = over(trial.between.largest, trial.accuracy.estimate);
+        let mut passive = None;
+        // The pull's map costs more: it is made once the field's holds.
+        if excess <= 1.0 {
+            passive = passive_map(scene, &trial.map, progress)?;
+            let of_pull = passive
+                .as_ref()
+                .map(|pull| over(pull.between, pull.accuracy.estimate));
+            excess = excess.max(of_pull.unwrap_or(0.0));
+        }
         let finer = factor * (SPARE * excess.powf(1.0 / ORDER)).clamp(*FINER.start(), *FINER.end());
         let values = sampled(finer)
             .map(|axis| axis.samples as f64)
@@ -586,7 +612,10 @@ fn fewest_nodes(
                 Components::Gz => trial,
                 _ => own_map(scene, solved, &grid, components, progress)?,
             };
-            return Ok((grid, map));
+            if passive.is_none() {
+                passive = passive_map(scene, &map.map, progress)?;
+            }
+            return Ok((grid, map, passive));
         }
         (factor, attempt) = (finer, attempt + 1);
     }

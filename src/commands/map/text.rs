@@ -58,8 +58,12 @@ pub(super) fn summary(design: &Design, report: &MapReport) -> String {
         sheet.line(
             "error",
             &format!(
-                "{} {} the requested {}",
+                "{}{} {} the requested {}",
                 percent(requested.of_map),
+                (requested.of_pull).map_or_else(String::new, |off| format!(
+                    ", {} of the pull,",
+                    percent(off)
+                )),
                 if requested.met { "holds" } else { "exceeds" },
                 percent(requested.error)
             ),
