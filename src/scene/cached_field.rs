@@ -274,18 +274,19 @@ impl<'a> ShapeField<'a> {
         same.map(|(_, forces_n_per_a)| forces_n_per_a.clone())
     }
 
-    /// As [`Scene::force_vectors_n_per_a`].
+    /// As [`Scene::force_vectors_n_per_a`]; `what` as in [`Self::forces_n_per_a`].
     ///
     /// # Errors
     /// As there.
     pub fn force_vectors_n_per_a(
         self,
+        what: &str,
         scene: &Scene,
         solved: &Solved,
         points_m: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<Vec<[f64; 3]>, RunError> {
-        self.at_points("vectors", points_m, || {
+        self.at_points(what, points_m, || {
             scene.force_vectors_n_per_a(solved, points_m, progress)
         })
     }

@@ -19,6 +19,7 @@ use crate::map::{
     Components, FieldMap, InterpolationError, interpolation_error, interpolation_errors_by,
     tabulate,
 };
+use crate::numerics::lagrange::locate;
 use crate::progress::{Progress, Silent};
 
 /// A map and what is known of it.
@@ -42,6 +43,42 @@ pub struct SceneMap {
 const MAP_SHARE: f64 = 0.08;
 
 impl SceneMap {
+    /// The force of `currents_a`, one per coil of the array, on a magnet of this moment at `place_m`, N, along x, y
+    /// and z, as a runtime interpolates it; none sideways where the map holds the upward component alone, and `None`
+    /// outside the map.
+    #[must_use]
+    pub fn force_n(
+        &self,
+        moment_a_m2: [f64; 3],
+        currents_a: &[f64],
+        place_m: [f64; 3],
+    ) -> Option<[f64; 3]> {
+        let map = &self.map;
+        let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
+        let cell = locate([&map.x_m, &map.y_m, &map.z_m], place_m)?;
+        let [m_x, m_y, m_z] = moment_a_m2;
+        let tensors = map.gradient_t_per_m_per_a.as_deref();
+        let mut force_n = [0.0; 3];
+        for (at, coil) in map.coils.iter().enumerate() {
+            let own = at * nodes..(at + 1) * nodes;
+            let tensor = tensors.map(|all| &all[9 * own.start..9 * own.end]);
+            for (axis, total) in force_n.iter_mut().enumerate() {
+                let along_z = match (axis, &self.sides) {
+                    (2, _) => cell.value(&map.gz_t_per_m_per_a[own.clone()]),
+                    (_, Some(sides)) => cell.value(&sides[axis][own.clone()]),
+                    (_, None) => continue,
+                };
+                let mut force = m_z * along_z;
+                if let Some(tensor) = tensor {
+                    force += m_x * cell.component(tensor, 9, axis);
+                    force += m_y * cell.component(tensor, 9, 3 + axis);
+                }
+                *total += currents_a[*coil] * force;
+            }
+        }
+        Some(force_n)
+    }
+
     /// Maps of `coils` of `scene` over `grid`: of the field itself, or of the mean that a magnet
     /// feels, F_z / m_z being what the map gives.
     ///

@@ -7,7 +7,6 @@ pub mod core_material;
 pub mod cost;
 pub mod drawing;
 pub mod evaluation_sample;
-pub mod felt_force;
 pub mod field_slice;
 pub mod iron;
 pub(crate) mod knee;

@@ -56,7 +56,7 @@ fn the_number_of_packages_is_stated() {
 fn features(selection: &[&str]) -> BTreeSet<(String, String)> {
     let mut tree = Command::new(env!("CARGO"));
     tree.current_dir(root())
-        .args(["tree", "--locked", "--offline", "--prefix", "none"])
+        .args(["tree", "--locked", "--prefix", "none"])
         .args(["--format", "{p}\t{f}", "--edges", "normal,build,dev"])
         .args(selection);
     let output = tree.output().unwrap();

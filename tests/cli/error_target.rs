@@ -1,5 +1,7 @@
 //! `--error`: one budget, held, obeyed, recorded.
 
+use fluxform::bundle::headline::BudgetName;
+use fluxform::bundle::load::Bundle;
 use fluxform_testing::place::Place;
 use serde_json::Value;
 
@@ -495,4 +497,57 @@ fn regression_a_map_of_a_requested_error_did_not_count_the_pull() {
     assert!((of_pull / (between + at_nodes) - 1.0).abs() < 1e-12);
     assert!(of_pull <= 0.05, "{of_pull}");
     assert_eq!(run["requested"]["met"], true);
+}
+
+/// The map's interpolation was compared in the middles of whole cells, all above a rim, where it is worst; and along z
+/// alone, also where the force along a surface's normal is requested.
+#[test]
+fn regression_interpolation_at_a_rim_and_sideways_was_not_counted() {
+    let place = Place::new();
+    let air = std::fs::read_to_string(SEED).unwrap();
+    for force in ["vertical", "normal"] {
+        let dome = "primitive = \"half-sphere\"\nradius_mm = 50.0\nbase_mm = 15.0\n";
+        let dome = shape(&place, force, &format!("{dome}force = \"{force}\"\n"));
+        let bundle = |samples: usize| {
+            let name = format!("nodes_{samples}");
+            let (head, _) = air.split_once("[workspace]").unwrap();
+            let along = format!("[-50.0, 50.0, {samples}]");
+            let workspace =
+                format!("[workspace]\nx_mm = {along}\ny_mm = {along}\nz_mm = [10.0, 80.0, 57]\n");
+            let design = format!("{name}.toml");
+            place.write(&design, &format!("{head}{workspace}"));
+            place
+                .run(&["calibrate", &design, &dome, "--out", &name])
+                .ends(0);
+            Bundle::open(&place.path(&format!("{name}/seed_air/{force}"))).unwrap()
+        };
+        let (coarse, fine) = (bundle(21), bundle(61));
+        let lambda = fine.lambda.lambda_n_per_m.unwrap();
+        let currents = fine.lambda.currents_a.as_deref().unwrap();
+        let force_n = |bundle: &Bundle, at: [f64; 3]| {
+            let mut vectors = vec![[0.0; 3]; currents.len()];
+            if bundle.force_vector_per_ampere(at, &mut vectors).is_none() {
+                let mut upward = vec![0.0; currents.len()];
+                assert!(bundle.force_per_ampere(at, &mut upward));
+                vectors = upward.into_iter().map(|z| [0.0, 0.0, z]).collect();
+            }
+            let each = vectors.iter().zip(currents);
+            each.fold([0.0; 3], |sum: [f64; 3], (force, i)| {
+                [0, 1, 2].map(|axis| sum[axis] + i * force[axis])
+            })
+        };
+        let off = fine.points.iter().map(|point| {
+            let at = [point.x_m, point.y_m, point.height_m];
+            let (a, b) = (force_n(&coarse, at), force_n(&fine, at));
+            let square = (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>();
+            square.sqrt() / (lambda * at[2])
+        });
+        let largest = off.fold(0.0, f64::max);
+        let headline = coarse.lambda.headline.as_ref().unwrap();
+        let stated = headline.error_of(BudgetName::Interpolation);
+        assert!(
+            largest <= stated && stated <= 3.0 * largest,
+            "{force}: {largest} {stated}"
+        );
+    }
 }

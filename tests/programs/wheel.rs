@@ -119,7 +119,7 @@ fn the_source_distribution_holds_what_a_build_needs() {
     run(in_folder("python3").args(["-m", "tarfile", "-e", &archive, "unpacked"]));
     let tree = format!("unpacked/fluxform-{version}");
     run(in_folder("cargo")
-        .args(["metadata", "--locked", "--offline", "--format-version", "1"])
+        .args(["metadata", "--locked", "--format-version", "1"])
         .args(["--manifest-path", &format!("{tree}/src/python/Cargo.toml")]));
     let is_compiled_in = |line: &str| {
         let (_, rest) = line.split_once("include_str!(\"")?;

@@ -33,6 +33,7 @@ use crate::lambda::{Criterion, Solution};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::coupled;
+use crate::scene::maps::SceneMap;
 use crate::scene::sources::{ShapeSource, check_names};
 
 /// The errors for which the cheapest settings are named.
@@ -251,7 +252,7 @@ fn off(found: f64, reference: f64) -> f64 {
 /// The largest error of the force that the run's currents give by its map.
 fn felt_error(
     places: &Places,
-    map: &crate::map::FieldMap,
+    map: &SceneMap,
     lambda: &LambdaFile,
 ) -> Result<Option<f64>, RunError> {
     let Some((constant, currents)) = lambda.lambda_n_per_m.zip(lambda.currents_a.as_deref()) else {

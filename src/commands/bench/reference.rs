@@ -10,11 +10,10 @@ use crate::commands::lambda::{ForcePoints, ForcesAt};
 use crate::design::message_text::number;
 use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, ForceProblem, Settings, Solution, Wiring};
-use crate::map::FieldMap;
 use crate::map::interpolation::SAFETY;
 use crate::progress::Silent;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::felt_force::by_map;
+use crate::scene::maps::SceneMap;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
@@ -346,7 +345,7 @@ impl Places {
     /// A place outside the map.
     pub fn felt_error(
         &self,
-        map: &FieldMap,
+        map: &SceneMap,
         lambda_n_per_m: f64,
         currents_a: &[f64],
     ) -> Result<f64, RunError> {
@@ -354,7 +353,8 @@ impl Places {
         let rows = self.forces.n_per_a.chunks(self.coils);
         for (row, (place, direct)) in self.position_m.iter().zip(rows).enumerate() {
             let own_n = self.forces.off.at(row, direct, currents_a);
-            let by_map = by_map(map, self.moment_a_m2, currents_a, *place).ok_or_else(|| {
+            let by_map = map.force_n(self.moment_a_m2, currents_a, *place);
+            let [.., by_map] = by_map.ok_or_else(|| {
                 RunError::Input(format!(
                     "shape {:?}: a place of its surface lies outside the map",
                     self.shape

@@ -11,7 +11,7 @@ use crate::commands::calibrate::needed_nodes;
 use crate::commands::discretize::scattered;
 use crate::commands::discretize::{self, PointsReport};
 use crate::commands::lambda::{ForcePoints, LambdaOptions, resolving, solve_at};
-use crate::map::{Components, FieldMap};
+use crate::map::Components;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::maps::{MagnetMean, SceneMap, check_nodes};
@@ -189,7 +189,7 @@ impl<'a> Bench<'a> {
         solved: &BothSolved,
         points: &ConstraintPoints,
         samples: [usize; 3],
-    ) -> Result<(FieldMap, f64), RunError> {
+    ) -> Result<(SceneMap, f64), RunError> {
         let design = self.scene.design.with_nodes(samples);
         let grid = needed_nodes(&design, points, DEFAULT_REACH_M);
         let coils = needed_coils(self.scene);
@@ -202,8 +202,7 @@ impl<'a> Bench<'a> {
             let solved = &solved.map;
             let share = MAGNET_SHARE * solved.tolerance;
             let felt = MagnetMean::by_magnet(self.scene, &grid.z_m, share)?;
-            let made = SceneMap::new(self.scene, solved, &coils, &grid, components, &felt, within)?;
-            Ok(made.map)
+            SceneMap::new(self.scene, solved, &coils, &grid, components, &felt, within)
         })
     }
 

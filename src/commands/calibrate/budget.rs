@@ -103,6 +103,7 @@ impl Calibration<'_> {
             points,
             lambda_n_per_m: headline.lambda_n_per_m,
             currents_a,
+            vector: self.force().direction.is_vector(),
         };
         effect.nodes(target.of_interpolation(), progress).map(Some)
     }
@@ -131,11 +132,12 @@ impl Calibration<'_> {
             points: &heights.discretized.points,
             lambda_n_per_m: headline.lambda_n_per_m,
             currents_a,
+            vector: self.force().direction.is_vector(),
         };
         let (between, jumps) = between_points(heights);
         let made = &needed.made;
         let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
-        let interpolation = effect.interpolation(&made.map, progress)?;
+        let interpolation = effect.interpolation(made, progress)?;
         // The stated error at the nodes is of the largest pull, which is relative to the same force.
         let share = headline.error_of(BudgetName::Pull) / of_pull;
         let pull = passive.filter(|_| share.is_finite());

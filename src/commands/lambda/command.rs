@@ -93,6 +93,8 @@ pub struct Lambda {
 #[derive(Debug, Clone, Args)]
 struct WiringFlags {
     /// Coils that carry no current, like 3,5
+    ///
+    /// For a bundle of such an array, list each coil's current in the design: current_max_a = [2, 2, 2, 0, 2, 0].
     #[arg(
         long,
         hide_short_help = true,

@@ -3,34 +3,41 @@
 
 use crate::RunError;
 use crate::bundle::headline::{BudgetName, BudgetPart};
-use crate::map::FieldMap;
+use crate::commands::map::fewest_nodes::fewest_nodes;
+use crate::map::tabulate::Grid;
 use crate::numerics::lagrange::stencil;
-use crate::numerics::spread::spread;
+use crate::numerics::random::mixed;
+use crate::numerics::vec3::{minus, norm};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::felt_force::by_map;
+use crate::scene::maps::SceneMap;
 use crate::scene::passive;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::steel::Solved;
 use crate::shape::points::ConstraintPoints;
 use fluxform_base::least_request::lowest_requested_m;
 
-/// Cells in whose middle the map is compared with the field, at most.
+/// Places at which the map is compared with the field, at most.
 const MOST_PLACES: usize = 600;
+/// Those at which a map's nodes are chosen: few, because each needs the field at 64 nodes.
+const CHOOSING_PLACES: usize = 32;
 /// The largest difference found, times this, stands for the largest anywhere.
 const MARGIN: f64 = 1.5;
 
-/// Middles of cells whose four corners are points, with the mean of their heights, or of a line's intervals; the
-/// points themselves where no cell is whole.
-fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
+/// Up to `most` of the points and of the middles of cells whose four corners are points, with the mean of their
+/// heights, or of a line's intervals.
+///
+/// Interpolation is worst where the magnet is lowest, and a rim is lower than any middle: places are the denser, the
+/// lower they are.
+fn places_on(points: &ConstraintPoints, most: usize) -> Vec<[f64; 3]> {
     let Some(lowest_m) = lowest_requested_m(points.height_m.iter().copied()) else {
         return Vec::new();
     };
     let rows = points.row_of_grid_point();
     let [columns, lines] = points.grid.samples();
     let [right, above] = [columns, lines].map(|samples| usize::from(samples > 1));
-    let mut all: Vec<[f64; 3]> = (0..rows.len())
+    let middles = (0..rows.len())
         .filter(|place| place % columns + right < columns && place / columns + above < lines)
         .filter_map(|place| {
             let next = place + above * columns;
@@ -44,20 +51,21 @@ fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
                     .zip(at)
                     .for_each(|(sum, v)| *sum += 0.25 * v);
             }
-            (middle[2] >= lowest_m).then_some(middle)
-        })
+            Some(middle)
+        });
+    let each = (0..points.height_m.len())
+        .map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
+    let all = middles.chain(each).filter(|[_, _, z_m]| *z_m >= lowest_m);
+    // Places of one height in no order, so that some of them are all over the plan.
+    let mut all: Vec<(u64, [f64; 3])> = (0..).map(mixed).zip(all).collect();
+    all.sort_unstable_by(|(a, [_, _, low]), (b, [_, _, high])| low.total_cmp(high).then(a.cmp(b)));
+    let count = all.len();
+    let most = most.min(count);
+    let mut some: Vec<usize> = (0..most)
+        .map(|n| ((n as f64 / most as f64).powi(2) * count as f64) as usize)
         .collect();
-    if all.is_empty() {
-        let rows = 0..points.height_m.len();
-        let each = rows.map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
-        all = each.filter(|[_, _, z_m]| *z_m >= lowest_m).collect();
-    }
-    some_of(&all, MOST_PLACES)
-}
-
-fn some_of(places: &[[f64; 3]], most: usize) -> Vec<[f64; 3]> {
-    let some = spread(places.len(), most).into_iter();
-    some.map(|place| places[place]).collect()
+    some.dedup();
+    some.into_iter().map(|place| all[place].1).collect()
 }
 
 /// A map against the field itself, over the surface between its points.
@@ -68,20 +76,9 @@ pub(crate) struct MapEffect<'a> {
     pub(crate) points: &'a ConstraintPoints,
     pub(crate) lambda_n_per_m: f64,
     pub(crate) currents_a: &'a [f64],
+    /// Whether all three components of the force are requested.
+    pub(crate) vector: bool,
 }
-
-/// Places at which a map's samples are chosen: few, because each needs the field at 64 nodes.
-const CHOOSING_PLACES: usize = 32;
-/// Share of the design's samples that is tried first.
-const FIRST: f64 = 0.3;
-/// Attempts at most.
-const ATTEMPTS: usize = 6;
-/// The interpolation's order.
-const ORDER: f64 = 4.0;
-/// A little more than the law says, so that the next attempt holds.
-const SPARE: f64 = 1.08;
-/// Samples along an axis at most.
-const MOST_NODES: usize = 385;
 
 impl MapEffect<'_> {
     /// The workspace's samples with which interpolation stays below `error`, as few as do.
@@ -93,43 +90,29 @@ impl MapEffect<'_> {
         error: f64,
         progress: &dyn Progress,
     ) -> Result<[usize; 3], RunError> {
-        let workspace = &self.scene.design.workspace;
-        let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-        let places = some_of(&middles(self.points), CHOOSING_PLACES);
-        let mut factor = FIRST;
-        let mut samples = axes.map(|axis| axis.samples);
-        for _ in 0..ATTEMPTS {
+        let places = places_on(self.points, CHOOSING_PLACES);
+        let (Grid { x_m, y_m, z_m }, ()) = fewest_nodes(self.scene, |grid| {
             progress.check()?;
-            samples = axes.map(|axis| match axis.samples {
-                1 => 1,
-                more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(4, MOST_NODES),
-            });
-            let off = MARGIN * self.interpolated_off(samples, &places, progress)?;
-            if off <= error || samples.iter().all(|n| *n >= MOST_NODES) {
-                break;
-            }
-            factor *= (SPARE * (off / error).powf(1.0 / ORDER)).clamp(1.1, 2.0);
-        }
-        Ok(samples)
+            let off = MARGIN * self.interpolated_off(grid, &places, progress)?;
+            Ok((off / error, ()))
+        })?;
+        Ok([x_m, y_m, z_m].map(|nodes| nodes.len()))
     }
 
-    /// The largest relative difference between the force at `places` and its interpolation from a grid
-    /// of so many samples, of which only the nodes that take part are computed; with that of the unpowered steel's pull,
+    /// The largest relative difference between the force at `places` and its interpolation on a `grid`,
+    /// of which only the nodes that take part are computed; with that of the unpowered steel's pull,
     /// where that counts.
     fn interpolated_off(
         &self,
-        samples: [usize; 3],
+        grid: &Grid,
         places: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<f64, RunError> {
-        let workspace = &self.scene.design.workspace;
-        let [mut x, mut y, mut z] = [workspace.x_m, workspace.y_m, workspace.z_m];
-        (x.samples, y.samples, z.samples) = (samples[0], samples[1], samples[2]);
-        let nodes = [x.nodes(), y.nodes(), z.nodes()];
+        let nodes = [&grid.x_m, &grid.y_m, &grid.z_m];
         let mut positions = Vec::new();
         let mut weights: Vec<Option<Vec<f64>>> = Vec::new();
         for place in places {
-            let along = [0, 1, 2].map(|axis| stencil(&nodes[axis], place[axis]));
+            let along = [0, 1, 2].map(|axis| stencil(nodes[axis], place[axis]));
             let [Some(x), Some(y), Some(z)] = along else {
                 weights.push(None);
                 continue;
@@ -147,32 +130,59 @@ impl MapEffect<'_> {
             positions.push(*place);
             weights.push(Some(own));
         }
-        let forces = (self.scene).forces_n_per_a(self.solved, &positions, progress)?;
-        let rows = forces.chunks_exact(self.scene.coils.len());
-        let total = rows.map(|row| {
-            row.iter()
-                .zip(self.currents_a)
-                .map(|(f, i)| f * i)
-                .sum::<f64>()
-        });
-        let totals: Vec<f64> = total.collect();
+        let totals = self.forces_n(ShapeField::default(), &positions, progress)?;
         // A runtime interpolates the pull in a map of its own, whose error adds up with that of the currents' force.
         let pull = passive::counted(self.scene, &positions)?;
-        let pulls_n = pull.map(|pull| pull.forces_z_n(&positions));
-        let largest_off = |forces_n: &[f64]| {
+        let upward = |force_z_n: Vec<f64>| -> Vec<[f64; 3]> {
+            force_z_n.into_iter().map(|z_n| [0.0, 0.0, z_n]).collect()
+        };
+        let pulls_n = pull.map(|pull| upward(pull.forces_z_n(&positions)));
+        let largest_off = |forces_n: &[[f64; 3]]| {
             let (mut largest, mut first) = (0.0_f64, 0);
             for (place, own) in places.iter().zip(&weights) {
                 let Some(own) = own else { continue };
-                let interpolated: f64 =
-                    own.iter().zip(&forces_n[first..]).map(|(w, f)| w * f).sum();
-                let direct = forces_n[first + own.len()];
-                let off = (interpolated - direct).abs() / (self.lambda_n_per_m * place[2]);
-                largest = largest.max(off);
+                let along = |axis: usize| {
+                    let nodes = own.iter().zip(&forces_n[first..]);
+                    nodes.map(|(w, force)| w * force[axis]).sum::<f64>()
+                };
+                let interpolated = [0, 1, 2].map(along);
+                largest = largest.max(self.off(interpolated, forces_n[first + own.len()], *place));
                 first += own.len() + 1;
             }
             largest
         };
         Ok(largest_off(&totals) + pulls_n.map_or(0.0, |pulls_n| largest_off(&pulls_n)))
+    }
+
+    /// The force of the currents at `positions`, N; along z alone where that alone is requested.
+    fn forces_n(
+        &self,
+        field: ShapeField,
+        positions: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f64; 3]>, RunError> {
+        let (scene, solved) = (self.scene, self.solved);
+        let coils = scene.coils.len();
+        if self.vector {
+            let forces =
+                field.force_vectors_n_per_a("middles", scene, solved, positions, progress)?;
+            let total = |row: &[[f64; 3]]| {
+                [0, 1, 2].map(|axis| {
+                    let each = row.iter().zip(self.currents_a);
+                    each.map(|(force, i)| force[axis] * i).sum()
+                })
+            };
+            return Ok(forces.chunks_exact(coils).map(total).collect());
+        }
+        let forces = field.forces_n_per_a("middles", scene, solved, positions, progress)?;
+        let total = |row: &[f64]| row.iter().zip(self.currents_a).map(|(f, i)| f * i).sum();
+        let upward = forces.chunks_exact(coils).map(total);
+        Ok(upward.map(|z_n| [0.0, 0.0, z_n]).collect())
+    }
+
+    /// Size of the difference of two forces at `place`, N, over lambda times its height.
+    fn off(&self, a: [f64; 3], b: [f64; 3], place: [f64; 3]) -> f64 {
+        norm(minus(a, b)) / (self.lambda_n_per_m * place[2])
     }
 
     /// The part of interpolation; `None` where nothing is requested within the map.
@@ -181,24 +191,21 @@ impl MapEffect<'_> {
     /// Forces that cannot be computed; interruption.
     pub(crate) fn interpolation(
         &self,
-        map: &FieldMap,
+        map: &SceneMap,
         progress: &dyn Progress,
     ) -> Result<Option<BudgetPart>, RunError> {
-        let places = middles(self.points);
-        let (scene, solved) = (self.scene, self.solved);
-        let forces = (self.field).forces_n_per_a("middles", scene, solved, &places, progress)?;
-        let direct = forces.chunks_exact(scene.coils.len());
-        let off = places.iter().zip(direct).filter_map(|(place, row)| {
-            let by_map = by_map(map, scene.moment_a_m2, self.currents_a, *place)?;
-            let direct: f64 = row.iter().zip(self.currents_a).map(|(f, i)| f * i).sum();
-            Some((by_map - direct).abs() / (self.lambda_n_per_m * place[2]))
+        let places = places_on(self.points, MOST_PLACES);
+        let direct = self.forces_n(self.field, &places, progress)?;
+        let off = places.iter().zip(direct).filter_map(|(place, direct)| {
+            let by_map = map.force_n(self.scene.moment_a_m2, self.currents_a, *place)?;
+            Some(self.off(by_map, direct, *place))
         });
         Ok(off.reduce(f64::max).map(|largest| BudgetPart {
             part: BudgetName::Interpolation,
             error: MARGIN * largest,
             how: format!(
                 "an estimate: {MARGIN} times the largest difference between map and field at up to \
-                 {MOST_PLACES} places of the surface between its points"
+                 {MOST_PLACES} places of the surface, at its points and between them, most of them low"
             ),
         }))
     }
@@ -206,7 +213,7 @@ impl MapEffect<'_> {
     /// The part of the pull's map, whose nodes are known to `at_nodes` of the requested force; `None` as of
     /// [`Self::interpolation`].
     pub(crate) fn of_pull(&self, passive: &PassiveMap, at_nodes: f64) -> Option<BudgetPart> {
-        let places = middles(self.points);
+        let places = places_on(self.points, MOST_PLACES);
         let off = passive.off_between_n(&places);
         let relative = off.map(|([_, _, z_m], off_n)| off_n / (self.lambda_n_per_m * z_m));
         relative.reduce(f64::max).map(|largest| BudgetPart {
@@ -214,8 +221,7 @@ impl MapEffect<'_> {
             error: at_nodes + MARGIN * largest,
             how: format!(
                 "the stated error of the pull at the map's nodes, times its largest share of the requested force; and an \
-                 estimate of interpolation: {MARGIN} times its largest difference at up to {MOST_PLACES} places of the \
-                 surface between its points"
+                 estimate of interpolation: {MARGIN} times its largest difference at the same places"
             ),
         })
     }

@@ -60,7 +60,7 @@ pub(crate) fn add(
     let positions_m = &chosen.positions_m;
     let pull = passive::counted(scene, positions_m)?;
     let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(positions_m));
-    let vectors = field.force_vectors_n_per_a(scene, solved, positions_m, progress)?;
+    let vectors = field.force_vectors_n_per_a("vectors", scene, solved, positions_m, progress)?;
     let resistance_ohm = scene.resistances_ohm();
     let of_axis = |axis: usize| -> Vec<f64> { vectors.iter().map(|force| force[axis]).collect() };
     let [along_x, along_y, upward] = [0, 1, 2].map(of_axis);

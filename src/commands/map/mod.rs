@@ -1,6 +1,7 @@
 //! `map`: gradient maps over the workspace, and the map's files.
 
 pub(crate) mod command;
+pub(crate) mod fewest_nodes;
 pub mod mag_manip;
 mod multipoles;
 mod picture;
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use self::fewest_nodes::fewest_nodes;
 use self::mag_manip::{
     MagManipRequest, MultipolesMade, MultipolesSummary, VectorFieldMade, VectorFieldSummary,
 };
@@ -371,7 +373,7 @@ impl Made {
                 let passive = passive_map(scene, &map.map, progress)?;
                 (grid, map, passive)
             }
-            Some(target) => fewest_nodes(scene, &solved, target, request.components, progress)?,
+            Some(target) => map_within(scene, &solved, target, request.components, progress)?,
         };
         let tabulated = (&grid, &map.map, lowest_m);
         let together = Together::new(scene, &solved, tabulated, request, progress)?;
@@ -511,7 +513,8 @@ impl Together {
 /// The outcome of a requested error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RequestedMap {
-    /// Requested of the map, at and between its nodes, relative to the largest |dB_z/dz| at the height.
+    /// Requested of the map, at and between its nodes, relative to the largest |dB_z/dz| at the height; of dB_x/dz and
+    /// dB_y/dz in a map of the force, relative to the largest of each.
     pub error: f64,
     /// Whether it holds, of the pull too.
     pub met: bool,
@@ -527,7 +530,7 @@ impl RequestedMap {
         let mut requested = Self {
             error: target.error,
             met: false,
-            of_map: made.accuracy.estimate + made.between.largest,
+            of_map: made.accuracy.estimate + largest_between(made),
             of_pull: passive.map(|pull| pull.accuracy.estimate + pull.between),
         };
         requested.met = requested.largest() <= target.error;
@@ -539,59 +542,30 @@ impl RequestedMap {
     }
 }
 
-/// Share of the design's samples that is tried first.
-const FIRST: f64 = 0.2;
-/// Attempts at most.
-const ATTEMPTS: usize = 8;
-/// The interpolation's order.
-const ORDER: f64 = 4.0;
-/// A little more than the law says, so that the next attempt holds.
-const SPARE: f64 = 1.05;
-/// How much finer the nodes become from one attempt to the next.
-const FINER: std::ops::RangeInclusive<f64> = 1.1..=2.0;
-/// Fewest nodes along an axis: those of a cubic.
-const FEWEST: usize = 4;
 /// Share of the requested error that is left to interpolation at least.
 const OF_INTERPOLATION: f64 = 0.1;
-/// Most values of all coils' maps that are tried.
-const MOST_VALUES: f64 = 2e7;
 
-/// The fewest nodes of the workspace whose map holds a requested error, that of the pull too, or the last that were
-/// tried, and the maps.
-fn fewest_nodes(
+/// The map of the fewest nodes that hold a requested error, that of the pull too, or of the last that were tried.
+fn map_within(
     scene: &Scene,
     solved: &Solved,
     target: ErrorTarget,
     components: Components,
     progress: &dyn Progress,
 ) -> Result<(Grid, SceneMap, Option<PassiveMap>), RunError> {
-    let workspace = &scene.design.workspace;
-    let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
-    let sampled = |factor: f64| {
-        axes.map(|mut axis| {
-            if axis.samples > 1 {
-                let intervals = ((axis.samples - 1) as f64 * factor).round();
-                axis.samples = (intervals as usize + 1).max(FEWEST);
-            }
-            axis
-        })
-    };
     // More nodes do not help where they are off themselves.
     let over = |between: f64, at_nodes: f64| {
         between / (target.error - at_nodes).max(OF_INTERPOLATION * target.error)
     };
-    let (mut factor, mut attempt) = (FIRST, 1);
-    loop {
+    // Of the field and the whole gradient the vertical component alone is judged.
+    let judged = match components {
+        Components::Force => Components::Force,
+        Components::Gz | Components::Gradient | Components::All => Components::Gz,
+    };
+    let (grid, (trial, passive)) = fewest_nodes(scene, |grid| {
         progress.check()?;
-        let [x, y, z] = sampled(factor);
-        let grid = Grid {
-            x_m: x.nodes(),
-            y_m: y.nodes(),
-            z_m: z.nodes(),
-        };
-        // The vertical component is the one whose interpolation is judged.
-        let trial = own_map(scene, solved, &grid, Components::Gz, progress)?;
-        let mut excess = over(trial.between.largest, trial.accuracy.estimate);
+        let trial = own_map(scene, solved, grid, judged, progress)?;
+        let mut excess = over(largest_between(&trial), trial.accuracy.estimate);
         let mut passive = None;
         // The pull's map costs more: it is made once the field's holds.
         if excess <= 1.0 {
@@ -601,24 +575,26 @@ fn fewest_nodes(
                 .map(|pull| over(pull.between, pull.accuracy.estimate));
             excess = excess.max(of_pull.unwrap_or(0.0));
         }
-        let finer = factor * (SPARE * excess.powf(1.0 / ORDER)).clamp(*FINER.start(), *FINER.end());
-        let values = sampled(finer)
-            .map(|axis| axis.samples as f64)
-            .iter()
-            .product::<f64>()
-            * scene.coils.len() as f64;
-        if excess <= 1.0 || attempt == ATTEMPTS || values > MOST_VALUES {
-            let map = match components {
-                Components::Gz => trial,
-                _ => own_map(scene, solved, &grid, components, progress)?,
-            };
-            if passive.is_none() {
-                passive = passive_map(scene, &map.map, progress)?;
-            }
-            return Ok((grid, map, passive));
-        }
-        (factor, attempt) = (finer, attempt + 1);
-    }
+        Ok((excess, (trial, passive)))
+    })?;
+    let map = if components == judged {
+        trial
+    } else {
+        own_map(scene, solved, &grid, components, progress)?
+    };
+    let passive = match passive {
+        None => passive_map(scene, &map.map, progress)?,
+        made => made,
+    };
+    Ok((grid, map, passive))
+}
+
+/// The interpolation error of the vertical component and, where the map holds them alone, of the sideways ones.
+fn largest_between(made: &SceneMap) -> f64 {
+    let sides = made.sides_between.iter().flatten();
+    sides
+        .map(|side| side.largest)
+        .fold(made.between.largest, f64::max)
 }
 
 /// The nodes of the design's workspace.
