@@ -6,7 +6,7 @@ use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::commands::map::fewest_nodes::fewest_nodes;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange::stencil;
-use crate::numerics::random::mixed;
+use crate::numerics::spread::spread;
 use crate::numerics::vec3::{minus, norm};
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -20,6 +20,8 @@ use fluxform_base::least_request::lowest_requested_m;
 
 /// Places at which the map is compared with the field, at most.
 const MOST_PLACES: usize = 600;
+/// So many of the lowest places are given half of them, the more the lower.
+const LOWEST: usize = 4000;
 /// Those at which a map's nodes are chosen: few, because each needs the field at 64 nodes.
 const CHOOSING_PLACES: usize = 32;
 /// The largest difference found, times this, stands for the largest anywhere.
@@ -28,8 +30,7 @@ const MARGIN: f64 = 1.5;
 /// Up to `most` of the points and of the middles of cells whose four corners are points, with the mean of their
 /// heights, or of a line's intervals.
 ///
-/// Interpolation is worst where the magnet is lowest, and a rim is lower than any middle: places are the denser, the
-/// lower they are.
+/// Interpolation is worst where the magnet is lowest, and a rim is lower than any middle.
 fn places_on(points: &ConstraintPoints, most: usize) -> Vec<[f64; 3]> {
     let Some(lowest_m) = lowest_requested_m(points.height_m.iter().copied()) else {
         return Vec::new();
@@ -56,16 +57,24 @@ fn places_on(points: &ConstraintPoints, most: usize) -> Vec<[f64; 3]> {
     let each = (0..points.height_m.len())
         .map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
     let all = middles.chain(each).filter(|[_, _, z_m]| *z_m >= lowest_m);
-    // Places of one height in no order, so that some of them are all over the plan.
-    let mut all: Vec<(u64, [f64; 3])> = (0..).map(mixed).zip(all).collect();
-    all.sort_unstable_by(|(a, [_, _, low]), (b, [_, _, high])| low.total_cmp(high).then(a.cmp(b)));
-    let count = all.len();
-    let most = most.min(count);
-    let mut some: Vec<usize> = (0..most)
-        .map(|n| ((n as f64 / most as f64).powi(2) * count as f64) as usize)
+    let mut all: Vec<[f64; 3]> = all.collect();
+    let by_height = |a: &[f64; 3], b: &[f64; 3]| a[2].total_cmp(&b[2]);
+    let low = all.len().min(LOWEST);
+    if low < all.len() {
+        all.select_nth_unstable_by(low, by_height);
+    }
+    let (lowest, others) = all.split_at_mut(low);
+    lowest.sort_by(by_height);
+    let of_others = spread(others.len(), most / 2);
+    let of_lowest = (most - of_others.len()).min(low);
+    let mut chosen: Vec<usize> = (0..of_lowest)
+        .map(|n| ((n as f64 / of_lowest as f64).powi(2) * low as f64) as usize)
         .collect();
-    some.dedup();
-    some.into_iter().map(|place| all[place].1).collect()
+    chosen.dedup();
+    let chosen = chosen.into_iter().map(|place| lowest[place]);
+    chosen
+        .chain(of_others.into_iter().map(|place| others[place]))
+        .collect()
 }
 
 /// A map against the field itself, over the surface between its points.
