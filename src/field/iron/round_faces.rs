@@ -216,7 +216,7 @@ impl Cell {
                     if turn < 0.0 {
                         turn += TAU;
                     }
-                    debug_assert!(turn < PI);
+                    assert!(turn < PI);
                     Curve::arc(middle, radius, first, first + turn)
                 }
                 _ => Curve::segment(a, b),

@@ -231,7 +231,7 @@ impl ArraySources {
                 out[at..at + count].copy_from_slice(&values[..count]);
             }
         }
-        debug_assert_eq!(out.len(), columns * points_m.len());
+        assert_eq!(out.len(), columns * points_m.len());
     }
 
     /// The level that does for a place at `[x, y, z]` from a core's axis.

@@ -575,7 +575,7 @@ pub fn study(
         price_n2_per_w: robust.price_n2_per_w,
     }
     .ranked(&forms);
-    debug_assert!(around.places() == displacements_m(given).len() && RULE == 14);
+    assert!(around.places() == displacements_m(given).len() && RULE == 14);
     Ok(Some(Study {
         given: *given,
         lambda_n_per_m: bench.lambda,

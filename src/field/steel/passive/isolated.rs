@@ -120,7 +120,7 @@ impl Isolated {
             shape_z += at * rho.slope_z * cos;
             shape_t -= j as f64 * below * rho.value * sin;
         }
-        debug_assert_eq!(found.len(), self.harmonics + 1);
+        assert_eq!(found.len(), self.harmonics + 1);
         let radial = -energy * (r_m * found[0].slope_over_r * shape + shape_r);
         let around = -energy * shape_t;
         let up = -energy * (found[0].slope_z * shape + shape_z);
