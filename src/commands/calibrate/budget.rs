@@ -2,7 +2,7 @@
 //! lambda's own.
 
 use super::Calibration;
-use super::needed_map::NeededMap;
+use super::needed_map::{NeededMap, needed_nodes};
 use crate::RunError;
 use crate::bundle::headline::BudgetName;
 use crate::bundle::lambda_file::LambdaFile;
@@ -12,8 +12,10 @@ use crate::commands::discretize::{OpenedSurface, PointsOptions, PointsReport};
 use crate::commands::lambda::LambdaReport;
 use crate::commands::lambda::error_target::{ChosenGrid, ErrorTarget, Trial};
 use crate::commands::lambda::map_error::MapEffect;
+use crate::commands::map::fewest_nodes::fewest_nodes;
+use crate::design::Design;
+use crate::map::tabulate::Grid;
 use crate::progress::Progress;
-use crate::scene::cached_field::ShapeField;
 use crate::scene::passive_map::PassiveMap;
 use crate::shape::certificate::Certify;
 use crate::shape::points::ConstraintPoints;
@@ -78,34 +80,69 @@ impl Calibration<'_> {
             .map(Some)
     }
 
-    /// The workspace's samples for the requested error; `None`: the design's own.
-    pub(super) fn nodes(
+    /// The part of the maps that the object needs, and the design with its nodes: as few as hold the requested error
+    /// where they are chosen for it, the design's own otherwise.
+    pub(super) fn map(
         &self,
         search: Option<&(ErrorTarget, ChosenGrid)>,
         lambda: &LambdaReport,
         points: &ConstraintPoints,
         progress: &dyn Progress,
-    ) -> Result<Option<[usize; 3]>, RunError> {
-        let design = self.scene.design;
-        let (Some((target, _)), Some(currents_a)) = (search, &lambda.file.currents_a) else {
-            return Ok(None);
+    ) -> Result<(Design, NeededMap), RunError> {
+        let scene = self.scene;
+        let made = |design: &Design| {
+            let solved = (&self.solved.map, self.force().direction.is_vector());
+            let grid = (design, points, self.options.reach_m);
+            NeededMap::new(scene, solved, self.field, grid, progress)
         };
-        let Some(headline) = &lambda.file.headline else {
-            return Ok(None);
+        let chooses = |target: &ErrorTarget| target.refine || !scene.design.workspace.is_given;
+        let target = search.map(|(target, _)| *target).filter(chooses);
+        let headline = lambda.file.headline.as_ref();
+        let solution = headline.zip(lambda.file.currents_a.as_deref());
+        let Some((target, (headline, currents_a))) = target.zip(solution) else {
+            return Ok((scene.design.clone(), made(scene.design)?));
         };
-        if design.workspace.is_given && !target.refine {
-            return Ok(None);
-        }
-        let effect = MapEffect {
+        let effect = self.map_effect(points, headline.lambda_n_per_m, currents_a);
+        let places = effect.choosing_places();
+        let over = |error: f64| error / target.of_interpolation();
+        let with = |grid: &Grid| {
+            let samples = [&grid.x_m, &grid.y_m, &grid.z_m].map(Vec::len);
+            scene.design.with_nodes(samples)
+        };
+        let tabulated = |grid: &Grid| needed_nodes(&with(grid), points, self.options.reach_m);
+        let (grid, needed) = fewest_nodes(scene, tabulated, |grid| {
+            progress.check()?;
+            let of_few = over(effect.interpolation_at(&places, grid, progress)?);
+            if of_few > 1.0 {
+                return Ok((of_few, None));
+            }
+            // Few places miss the largest error: the map itself decides.
+            let needed = made(&with(grid))?;
+            let of_map = effect.interpolation(&needed.made, progress)?;
+            let of_map = of_map.map_or(0.0, |part| over(part.error));
+            Ok((of_map, Some(needed)))
+        })?;
+        let design = with(&grid);
+        let needed = needed.map_or_else(|| made(&design), Ok)?;
+        Ok((design, needed))
+    }
+
+    /// The map of a solution against the field, on the surface of `points`.
+    fn map_effect<'a>(
+        &'a self,
+        points: &'a ConstraintPoints,
+        lambda_n_per_m: f64,
+        currents_a: &'a [f64],
+    ) -> MapEffect<'a> {
+        MapEffect {
             scene: self.scene,
             solved: &self.solved.forces,
-            field: ShapeField::default(),
+            field: self.field,
             points,
-            lambda_n_per_m: headline.lambda_n_per_m,
+            lambda_n_per_m,
             currents_a,
             vector: self.force().direction.is_vector(),
-        };
-        effect.nodes(target.of_interpolation(), progress).map(Some)
+        }
     }
 
     /// Adds the runtime's part of the error: heights and forces between points and nodes.
@@ -125,15 +162,8 @@ impl Calibration<'_> {
         let Some(headline) = &mut lambda.file.headline else {
             return Ok(());
         };
-        let effect = MapEffect {
-            scene: self.scene,
-            solved: &self.solved.forces,
-            field: self.field,
-            points: &heights.discretized.points,
-            lambda_n_per_m: headline.lambda_n_per_m,
-            currents_a,
-            vector: self.force().direction.is_vector(),
-        };
+        let points = &heights.discretized.points;
+        let effect = self.map_effect(points, headline.lambda_n_per_m, currents_a);
         let (between, jumps) = between_points(heights);
         let made = &needed.made;
         let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);

@@ -508,12 +508,7 @@ impl Calibration<'_> {
             progress,
         )?;
         let grid_points = &object.found.discretized.points;
-        let nodes = self.nodes(search, &lambda, fine_points, progress)?;
-        let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
-        let design = gridded.as_ref().unwrap_or(scene.design);
-        let grid = (design, fine_points, self.options.reach_m);
-        let vector = self.force().direction.is_vector();
-        let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
+        let (design, mut needed) = self.map(search, &lambda, fine_points, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;

@@ -118,11 +118,15 @@ fn drop_weak_coils(
 ) {
     let map = &mut made.map;
     let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
-    let strength: Vec<f64> = coils
-        .iter()
-        .zip(map.gz_t_per_m_per_a.chunks_exact(nodes.max(1)))
-        .map(|(coil, gz)| {
-            let largest = gz.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+    // Far beside a coil its sideways force is many times its upward one.
+    let components: Vec<&[f64]> = (made.sides.iter().flatten())
+        .chain([&map.gz_t_per_m_per_a])
+        .map(Vec::as_slice)
+        .collect();
+    let strength: Vec<f64> = (coils.iter().enumerate())
+        .map(|(at, coil)| {
+            let own = (components.iter()).flat_map(|all| &all[at * nodes..(at + 1) * nodes]);
+            let largest = own.fold(0.0_f64, |most, g| most.max(g.abs()));
             largest * largest_current_a(scene, coil.number)
         })
         .collect();

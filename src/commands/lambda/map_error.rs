@@ -3,7 +3,6 @@
 
 use crate::RunError;
 use crate::bundle::headline::{BudgetName, BudgetPart};
-use crate::commands::map::fewest_nodes::fewest_nodes;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange::stencil;
 use crate::numerics::spread::spread;
@@ -90,31 +89,20 @@ pub(crate) struct MapEffect<'a> {
 }
 
 impl MapEffect<'_> {
-    /// The workspace's samples with which interpolation stays below `error`, as few as do.
+    /// Places at which a map's nodes are chosen.
+    pub(crate) fn choosing_places(&self) -> Vec<[f64; 3]> {
+        places_on(self.points, CHOOSING_PLACES)
+    }
+
+    /// The part of interpolation on a `grid` as few `places` show it, at which only the nodes that take part are
+    /// computed; with that of the unpowered steel's pull, where that counts.
     ///
     /// # Errors
     /// Forces that cannot be computed; interruption.
-    pub(crate) fn nodes(
+    pub(crate) fn interpolation_at(
         &self,
-        error: f64,
-        progress: &dyn Progress,
-    ) -> Result<[usize; 3], RunError> {
-        let places = places_on(self.points, CHOOSING_PLACES);
-        let (Grid { x_m, y_m, z_m }, ()) = fewest_nodes(self.scene, |grid| {
-            progress.check()?;
-            let off = MARGIN * self.interpolated_off(grid, &places, progress)?;
-            Ok((off / error, ()))
-        })?;
-        Ok([x_m, y_m, z_m].map(|nodes| nodes.len()))
-    }
-
-    /// The largest relative difference between the force at `places` and its interpolation on a `grid`,
-    /// of which only the nodes that take part are computed; with that of the unpowered steel's pull,
-    /// where that counts.
-    fn interpolated_off(
-        &self,
-        grid: &Grid,
         places: &[[f64; 3]],
+        grid: &Grid,
         progress: &dyn Progress,
     ) -> Result<f64, RunError> {
         let nodes = [&grid.x_m, &grid.y_m, &grid.z_m];
@@ -160,7 +148,8 @@ impl MapEffect<'_> {
             }
             largest
         };
-        Ok(largest_off(&totals) + pulls_n.map_or(0.0, |pulls_n| largest_off(&pulls_n)))
+        let of_pull = pulls_n.map_or(0.0, |pulls_n| largest_off(&pulls_n));
+        Ok(MARGIN * (largest_off(&totals) + of_pull))
     }
 
     /// The force of the currents at `positions`, N; along z alone where that alone is requested.

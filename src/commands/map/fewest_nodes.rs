@@ -22,12 +22,14 @@ const FEWEST: usize = 4;
 const MOST_VALUES: f64 = 2e7;
 
 /// The fewest nodes of the workspace of `scene` on which the error is not above the requested one, or the last that
-/// were tried, with what `trial` made of them; it returns the error over the requested one, too.
+/// were tried, with what `trial` made of them; it returns the error over the requested one, too. Of a grid what is
+/// `tabulated` counts in the memory that is taken at most.
 ///
 /// # Errors
 /// Those of `trial`.
 pub(crate) fn fewest_nodes<T>(
     scene: &Scene,
+    tabulated: impl Fn(&Grid) -> Grid,
     mut trial: impl FnMut(&Grid) -> Result<(f64, T), RunError>,
 ) -> Result<(Grid, T), RunError> {
     let workspace = &scene.design.workspace;
@@ -42,7 +44,8 @@ pub(crate) fn fewest_nodes<T>(
         Grid { x_m, y_m, z_m }
     };
     let values = |grid: &Grid| {
-        let samples = [&grid.x_m, &grid.y_m, &grid.z_m].map(|nodes| nodes.len() as f64);
+        let Grid { x_m, y_m, z_m } = tabulated(grid);
+        let samples = [x_m, y_m, z_m].map(|nodes| nodes.len() as f64);
         samples.iter().product::<f64>() * scene.coils.len() as f64
     };
     let (mut factor, mut attempt, mut grid) = (FIRST, 1, sampled(FIRST));

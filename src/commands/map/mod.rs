@@ -562,7 +562,7 @@ fn map_within(
         Components::Force => Components::Force,
         Components::Gz | Components::Gradient | Components::All => Components::Gz,
     };
-    let (grid, (trial, passive)) = fewest_nodes(scene, |grid| {
+    let (grid, (trial, passive)) = fewest_nodes(scene, Grid::clone, |grid| {
         progress.check()?;
         let trial = own_map(scene, solved, grid, judged, progress)?;
         let mut excess = over(largest_between(&trial), trial.accuracy.estimate);
