@@ -105,11 +105,16 @@ pub fn picture(text: &str) -> Result<FileArgument, String> {
     if file.is_standard() || known || atomic::is_stream(path) {
         return Ok(file);
     }
+    // An unset variable of a script leaves an empty path.
+    let like = match path.file_name() {
+        Some(_) => path.with_extension("svg"),
+        None => PathBuf::from("plot.svg"),
+    };
     let endings = DrawingFormat::ALL.map(|(ending, _)| format!(".{ending}"));
     Err(format!(
         "the ending decides how it is drawn: expected one of {}, like {}",
         endings.join(", "),
-        path.with_extension("svg").display()
+        like.display()
     ))
 }
 

@@ -259,6 +259,7 @@ const MISTAKES: &[Mistake] = &[
         2,
         &["a value is required for '--out <DIR>'"],
     ),
+    (&["map", SEED, "--plot", ""], 2, &["like plot.svg"]),
     // Bundles and what follows them.
     (
         &["replay", "results/seed_air/flat"],
