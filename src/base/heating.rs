@@ -7,13 +7,16 @@
 //! with the heat capacity `C` of copper and steel, the resistance `R_a` at the temperature of the air `T_a`,
 //! copper's temperature coefficient `alpha_a` there, the surface coefficient `h` and the coil's outside `A`:
 //! its mantle and both end faces. One body, because heat crosses a winding in seconds and leaves it in
-//! many minutes. Where the first part grows faster than the second there is no steady temperature.
+//! many minutes. Where the first part grows faster than the second there is no steady temperature, unless the supply's
+//! voltage `V` ends the current: where `I R > V` the heat is `V^2 / R`, of the resistance `R` of the warm winding.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Beyond the melting point of copper no temperature is stated, C.
 const MELTED_C: f64 = 1085.0;
+/// To the last bits of a rise.
+const BISECTIONS: usize = 60;
 
 /// How a coil loses heat, and how warm it may become.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,12 +42,14 @@ pub struct WarmCoil {
     pub capacity_j_per_k: f64,
     /// Heat that leaves it, W/K.
     pub loss_w_per_k: f64,
+    /// The supply's voltage, V; `None` without a limit.
+    pub voltage_v: Option<f64>,
 }
 
-/// Temperatures of a coil under a current that stays.
+/// Temperatures of a coil under a current that stays, as far as the supply's voltage drives it through the warm winding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Heating {
-    /// The current, A.
+    /// The current at the temperature of the air, A.
     pub current_a: f64,
     /// Heat at the temperature of the air, W.
     pub power_w: f64,
@@ -54,7 +59,7 @@ pub struct Heating {
     pub surface_w_per_m2_k: f64,
     /// Temperature in the long run, C; null where it rises without end or copper melts.
     pub steady_c: Option<f64>,
-    /// Time in which the difference from the steady temperature falls by the factor e, s; null without one.
+    /// Time in which the difference from the steady temperature falls by the factor e near it, s; null without one.
     pub time_constant_s: Option<f64>,
     /// How long the current flows for the next temperature, s.
     pub heating_s: f64,
@@ -70,53 +75,161 @@ impl WarmCoil {
     /// Its temperatures under `current_a`, beginning at that of the air.
     #[must_use]
     pub fn heated(&self, current_a: f64, cooling: &Cooling) -> Heating {
-        let power_w = current_a * current_a * self.resistance_ohm;
-        // u' = start + rate u of the rise u.
-        let start = power_w / self.capacity_j_per_k;
-        let rate = (power_w * self.growth_per_k - self.loss_w_per_k) / self.capacity_j_per_k;
+        let held = self.held(current_a);
+        // Where the resistance has grown so much that the current ends.
+        let limited = self.voltage_v.map(|voltage_v| {
+            let growth = voltage_v / (current_a.abs() * self.resistance_ohm);
+            let from_k = ((growth - 1.0) / self.growth_per_k).max(0.0);
+            (from_k, self.limited(voltage_v))
+        });
+        // Of a current that stays where it never comes so far.
+        let limited =
+            limited.and_then(|(from_k, limited)| Some((from_k, held.time_s(from_k)?, limited)));
+        let (steady_k, time_constant_s) = match limited {
+            Some((_, _, limited)) => (Some(limited.steady_k), Some(limited.time_constant_s())),
+            None => (
+                held.steady_k(),
+                held.steady_k().map(|_| -1.0 / held.rate_per_s),
+            ),
+        };
+        let rise_k = match limited {
+            Some((from_k, from_s, limited)) if cooling.heating_s > from_s => {
+                limited.rise_k(from_k, cooling.heating_s - from_s)
+            }
+            _ => held.rise_k(cooling.heating_s),
+        };
+        let most_k = cooling.winding_max_c - cooling.ambient_c;
+        let winding_max_s = match limited {
+            Some((from_k, from_s, limited)) if most_k > from_k => {
+                limited.time_s(from_k, most_k).map(|time_s| from_s + time_s)
+            }
+            _ => held.time_s(most_k),
+        };
         let stated = |rise: f64| {
             let warm = cooling.ambient_c + rise;
             (warm < MELTED_C).then_some(warm)
         };
-        let most_k = cooling.winding_max_c - cooling.ambient_c;
+        let steady_c = steady_k.and_then(stated);
+        let first_a = (self.voltage_v)
+            .map_or(f64::INFINITY, |voltage_v| voltage_v / self.resistance_ohm)
+            .min(current_a.abs());
         Heating {
-            current_a,
-            power_w,
+            current_a: first_a,
+            power_w: first_a * first_a * self.resistance_ohm,
             ambient_c: cooling.ambient_c,
             surface_w_per_m2_k: cooling.surface_w_per_m2_k,
-            steady_c: if rate < 0.0 {
-                stated(-start / rate)
-            } else {
-                None
-            },
-            time_constant_s: (rate < 0.0).then(|| -1.0 / rate),
+            steady_c,
+            time_constant_s: time_constant_s.filter(|_| steady_c.is_some()),
             heating_s: cooling.heating_s,
-            after_c: stated(rise_k(start, rate, cooling.heating_s)),
+            after_c: stated(rise_k),
             winding_max_c: cooling.winding_max_c,
-            winding_max_s: time_s(start, rate, most_k),
+            winding_max_s,
+        }
+    }
+
+    /// The rise while the current stays.
+    fn held(&self, current_a: f64) -> HeldCurrent {
+        let power_w = current_a * current_a * self.resistance_ohm;
+        HeldCurrent {
+            start_k_per_s: power_w / self.capacity_j_per_k,
+            rate_per_s: (power_w * self.growth_per_k - self.loss_w_per_k) / self.capacity_j_per_k,
+        }
+    }
+
+    /// The rise while the voltage stays.
+    fn limited(&self, voltage_v: f64) -> HeldVoltage {
+        let (loss, growth) = (self.loss_w_per_k, self.growth_per_k);
+        let power_w = voltage_v * voltage_v / self.resistance_ohm;
+        // The positive root of loss u (1 + growth u) = power.
+        let root = (1.0 + 4.0 * growth * power_w / loss).sqrt();
+        HeldVoltage {
+            steady_k: 2.0 * power_w / loss / (1.0 + root),
+            growth_per_k: growth,
+            loss_per_s: loss / self.capacity_j_per_k,
         }
     }
 }
 
-/// The rise after a time, K.
-fn rise_k(start: f64, rate: f64, time_s: f64) -> f64 {
-    if rate == 0.0 {
-        start * time_s
-    } else {
-        start * (rate * time_s).exp_m1() / rate
+/// u' = start + rate u of the rise u.
+#[derive(Debug, Clone, Copy)]
+struct HeldCurrent {
+    start_k_per_s: f64,
+    rate_per_s: f64,
+}
+
+impl HeldCurrent {
+    /// In the long run, K; `None` where it rises without end.
+    fn steady_k(self) -> Option<f64> {
+        (self.rate_per_s < 0.0).then(|| -self.start_k_per_s / self.rate_per_s)
+    }
+
+    /// The rise after a time, K.
+    fn rise_k(self, time_s: f64) -> f64 {
+        let (start, rate) = (self.start_k_per_s, self.rate_per_s);
+        if rate == 0.0 {
+            start * time_s
+        } else {
+            start * (rate * time_s).exp_m1() / rate
+        }
+    }
+
+    /// The time until a rise of `rise_k`, s; `None` where it is never reached.
+    fn time_s(self, rise_k: f64) -> Option<f64> {
+        if rise_k <= 0.0 {
+            return Some(0.0);
+        }
+        let (start, rate) = (self.start_k_per_s, self.rate_per_s);
+        let grown = rate * rise_k / start;
+        match start > 0.0 && grown > -1.0 {
+            true if rate == 0.0 => Some(rise_k / start),
+            true => Some(grown.ln_1p() / rate),
+            false => None,
+        }
     }
 }
 
-/// The time until a rise of `rise_k`, s; `None` where it is never reached.
-fn time_s(start: f64, rate: f64, rise_k: f64) -> Option<f64> {
-    if rise_k <= 0.0 {
-        return Some(0.0);
+/// (1 + g u) u' = l (s - u) (1 + g (s + u)) of the rise u, which ends at s.
+#[derive(Debug, Clone, Copy)]
+struct HeldVoltage {
+    steady_k: f64,
+    growth_per_k: f64,
+    loss_per_s: f64,
+}
+
+impl HeldVoltage {
+    fn time_constant_s(self) -> f64 {
+        let grown = self.growth_per_k * self.steady_k;
+        (1.0 + grown) / (self.loss_per_s * (1.0 + 2.0 * grown))
     }
-    let grown = rate * rise_k / start;
-    match start > 0.0 && grown > -1.0 {
-        true if rate == 0.0 => Some(rise_k / start),
-        true => Some(grown.ln_1p() / rate),
-        false => None,
+
+    /// The time from a rise to another, s, by partial fractions; `None` where the other is never reached.
+    fn time_s(self, from_k: f64, to_k: f64) -> Option<f64> {
+        if to_k >= self.steady_k {
+            return None;
+        }
+        let grown = self.growth_per_k * self.steady_k;
+        let ahead = ((self.steady_k - from_k) / (self.steady_k - to_k)).ln();
+        let behind = |rise_k: f64| 1.0 + grown + self.growth_per_k * rise_k;
+        let behind = (behind(to_k) / behind(from_k)).ln();
+        let sum = (1.0 + grown) * ahead - grown * behind;
+        Some(sum / (self.loss_per_s * (1.0 + 2.0 * grown)))
+    }
+
+    /// The rise after a time from a rise on, K: by bisection of the time, which grows with it.
+    fn rise_k(self, from_k: f64, time_s: f64) -> f64 {
+        let (mut low_k, mut high_k) = (from_k, self.steady_k);
+        for _ in 0..BISECTIONS {
+            let middle_k = 0.5 * (low_k + high_k);
+            if self
+                .time_s(from_k, middle_k)
+                .is_some_and(|at_s| at_s < time_s)
+            {
+                low_k = middle_k;
+            } else {
+                high_k = middle_k;
+            }
+        }
+        low_k
     }
 }
 
@@ -137,7 +250,66 @@ mod tests {
             growth_per_k: 3.9e-3,
             capacity_j_per_k: 310.0,
             loss_w_per_k: 0.17,
+            voltage_v: None,
         }
+    }
+
+    /// A current that the supply drives through the cold winding alone: stated was what it would heat if it stayed.
+    #[test]
+    fn regression_a_voltage_s_end_of_the_current_was_not_counted() {
+        let current_a = 2.4;
+        let volts = |of: f64| Some(of * current_a * coil().resistance_ohm);
+        let stays_c = coil().heated(current_a, &COOLING).steady_c.unwrap();
+        for of in [0.9, 1.0, 1.15] {
+            let coil = WarmCoil {
+                voltage_v: volts(of),
+                ..coil()
+            };
+            let slope = |u: f64| {
+                let warm_ohm = coil.resistance_ohm * (1.0 + coil.growth_per_k * u);
+                let flows_a = current_a.min(coil.voltage_v.unwrap() / warm_ohm);
+                (flows_a.powi(2) * warm_ohm - coil.loss_w_per_k * u) / coil.capacity_j_per_k
+            };
+            let (mut u, mut reached_s, step_s) = (0.0, 0.0, 0.01);
+            let cooling = Cooling {
+                heating_s: 900.0,
+                winding_max_c: 60.0,
+                ..COOLING
+            };
+            for step in 0..90_000 {
+                let ahead = u + step_s * slope(u);
+                u += 0.5 * step_s * (slope(u) + slope(ahead));
+                if u < 37.0 {
+                    reached_s = step_s * f64::from(step + 1);
+                }
+            }
+            let heating = coil.heated(current_a, &cooling);
+            assert!(
+                (heating.after_c.unwrap() - 23.0 - u).abs() < 1e-5 * u,
+                "{of}"
+            );
+            assert!(
+                (heating.winding_max_s.unwrap() - reached_s).abs() < 0.02,
+                "{of}"
+            );
+            let steady_k = heating.steady_c.unwrap() - 23.0;
+            assert!(
+                steady_k + 23.0 < 0.6 * stays_c,
+                "{of}: {steady_k} {stays_c}"
+            );
+            assert!(slope(steady_k).abs() < 1e-12, "{of}");
+            let first_a = current_a * of.min(1.0);
+            assert!((heating.current_a / first_a - 1.0).abs() < 1e-15);
+            // Near the end the difference falls by e in the time constant.
+            let [a, b] = [1e-4, 2e-4].map(|off| slope(steady_k * (1.0 - off)) / (steady_k * off));
+            let constant_s = heating.time_constant_s.unwrap();
+            assert!((constant_s * (2.0 * a - b) - 1.0).abs() < 1e-5, "{of}");
+        }
+        let ample = WarmCoil {
+            voltage_v: Some(36.0),
+            ..coil()
+        };
+        assert_eq!(ample.heated(0.4, &COOLING), coil().heated(0.4, &COOLING));
     }
 
     /// Against small steps of Heun's rule.

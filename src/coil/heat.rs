@@ -12,7 +12,7 @@ use fluxform_field::winding::Winding;
 use super::circuit::Circuit;
 
 /// A coil of this winding and circuit, whose resistance is that at `wire_c`, with a core of `core_kg`: its
-/// mantle and end faces lose heat, of a coil without a core the faces of the winding.
+/// mantle and end faces lose heat, of a coil without a core the faces of the winding. No voltage limits its current.
 #[must_use]
 pub fn warm_coil(
     winding: &Winding,
@@ -33,5 +33,6 @@ pub fn warm_coil(
         capacity_j_per_k: COPPER_HEAT_CAPACITY_J_PER_KG_K * circuit.wire_mass_kg
             + STEEL_HEAT_CAPACITY_J_PER_KG_K * core_kg,
         loss_w_per_k: cooling.surface_w_per_m2_k * surface_m2,
+        voltage_v: None,
     }
 }

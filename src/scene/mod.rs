@@ -42,7 +42,7 @@ use crate::field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
-use crate::heating::Heating;
+use crate::heating::{Heating, WarmCoil};
 use crate::lambda::two_fingers::FingerMagnet;
 use crate::lambda::uncertainty::Turned;
 use crate::map::tabulate::PlacedCoil;
@@ -253,13 +253,17 @@ impl<'a> Scene<'a> {
         self.circuit.rated_current_a(&self.design.supply)
     }
 
-    /// How warm a coil alone in still air becomes under a current that stays.
+    /// How warm a coil alone in still air becomes under a current that stays, as far as the supply's voltage drives it.
     #[must_use]
     pub fn heated(&self, current_a: f64) -> Heating {
         let cooling = &self.design.cooling;
         let core_kg = self.core.as_ref().map_or(0.0, SceneCore::mass_kg);
         let wire_c = self.design.wire.temperature_c;
-        warm_coil(&self.winding, &self.circuit, wire_c, core_kg, cooling).heated(current_a, cooling)
+        let coil = WarmCoil {
+            voltage_v: self.design.supply.voltage_v,
+            ..warm_coil(&self.winding, &self.circuit, wire_c, core_kg, cooling)
+        };
+        coil.heated(current_a, cooling)
     }
 
     /// How far below its centre the magnet extends, m; 0 for a dipole.

@@ -89,8 +89,9 @@ pub struct Replay {
     dynamics: bool,
     /// Command currents chosen for the bundle's uncertainties
     ///
-    /// Those of the least expected error under the uncertainties that the bundle was made with; the
-    /// felt error is stated with and without them.
+    /// Those of the least expected error under the uncertainties that the bundle was made with, to
+    /// which their power adds at the bundle's price; the felt error is stated with and without them.
+    /// ok and saturated are those of exact positions.
     #[arg(long)]
     robust: bool,
     /// Draw finger, forces and currents over time to this file (.svg, .png or .pdf)

@@ -42,7 +42,7 @@ pub fn html(report: &ReplayReport, below: &Below) -> String {
         lead.element("p class=\"lead\"", &text);
     }
     let text = format!(
-        "{} of the time the limits bind, {} of it is outside the map. The forces are known to {} mN.",
+        "{} of the time the limits allow only the nearest force, {} of it is outside the map. The forces are known to {} mN.",
         percent(summary.saturated_time_fraction),
         percent(summary.outside_time_fraction),
         figures(summary.force_error_n() * 1e3, 2)

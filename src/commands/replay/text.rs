@@ -111,7 +111,7 @@ fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
     sheet.line(
         "limits",
         &format!(
-            "bind {} of the time; outside the map {}",
+            "allow only the nearest force {} of the time; outside the map {}",
             percent(summary.saturated_time_fraction),
             percent(summary.outside_time_fraction)
         ),
