@@ -32,7 +32,7 @@ struct Rule {
 }
 
 /// From the rule of [`mutual_inductance_h`] on, each finer than the one before.
-const RULES: [Rule; 4] = [
+const RULES: [Rule; 5] = [
     Rule {
         tolerance: 1e-7,
         nearest: 0.05,
@@ -53,11 +53,18 @@ const RULES: [Rule; 4] = [
         nearest: 0.012,
         most_nodes: 22,
     },
+    Rule {
+        tolerance: 1e-15,
+        nearest: 0.01,
+        most_nodes: 26,
+    },
 ];
 /// The difference of two rules, times this, is claimed of the coarser one.
 const CHANCE: f64 = 2.0;
 /// Rounding of a sum over all nodes, relative.
 const ROUNDING: f64 = 1e-14;
+/// Rules that agree as nearly as this, relative, have the same nodes.
+const SAME_NODES: f64 = 1e-15;
 
 /// Mutual inductance of two equal windings whose axes are `distance_m` apart, H; negative, as
 /// the flux returns outside. Domain: the windings do not overlap.
@@ -78,8 +85,10 @@ pub(crate) fn estimated_mutual_inductance_h(
     let mut error = f64::INFINITY;
     for rule in &RULES[1..] {
         let finer = by_rule(winding, distance_m, *rule);
-        error = CHANCE * (value - finer).abs() / finer.abs() + ROUNDING;
-        if error <= tolerance {
+        let apart = (value - finer).abs() / finer.abs();
+        error = CHANCE * apart + ROUNDING;
+        // Far apart rules take the same nodes, and their difference is no error.
+        if error <= tolerance && apart > SAME_NODES {
             break;
         }
         // The difference of two rules is the coarser one's error: the finer is at least as good.
@@ -121,9 +130,10 @@ fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
         let b = centre + half * x;
         let gap2 = ((distance_m - b).powi(2) - a2 * a2).max(0.0);
         let near = (gap2 / (distance_m * b)).sqrt().max(nearest_share);
-        // phi = pi - theta is zero at the closest approach. The midpoint rule over a period
-        // converges like exp(-n near), exactly for the harmonics that cancel far away.
-        let steps = ((distance_m / (b * tolerance)).ln() / (2.0 * near)).ceil() + 2.0;
+        // phi = pi - theta is zero at the closest approach, and the filaments meet at an imaginary phi: over a period
+        // the midpoint rule converges like exp(-n |phi|), exactly for the harmonics that cancel far away.
+        let meeting = 2.0 * (0.5 * near).asinh();
+        let steps = ((distance_m / (b * tolerance)).ln() / (2.0 * meeting)).ceil() + 2.0;
         for step in 0..steps as usize {
             let phi = PI * (step as f64 + 0.5) / steps;
             let sine = (0.5 * phi).sin();
@@ -228,6 +238,26 @@ mod tests {
         assert!((slowest_inductance_h(&[vec![1.7]]) - 1.7).abs() < 1e-15);
         assert!(slowest_inductance_h(&[vec![1.7, f64::NAN], vec![0.3, 1.3]]).is_nan());
         assert!(slowest_inductance_h(&[]).is_nan());
+    }
+
+    /// Stated was rounding alone, where two rules have the same nodes.
+    #[test]
+    fn regression_the_error_of_distant_coils_was_stated_as_rounding() {
+        let winding = Winding {
+            inner_radius_m: 0.015,
+            outer_radius_m: 0.016,
+            length_m: 0.001,
+            turns: 10.0,
+        };
+        let finest = Rule {
+            tolerance: 1e-18,
+            ..RULES[4]
+        };
+        for distance_m in [0.033, 0.1, 0.3, 1.0, 3.0, 10.0] {
+            let (value, error) = estimated_mutual_inductance_h(&winding, distance_m, 1e-4);
+            let off = (value / by_rule(&winding, distance_m, finest) - 1.0).abs();
+            assert!(off <= error, "{distance_m}: {off:e} of {error:e}");
+        }
     }
 
     #[test]
